@@ -54,6 +54,10 @@ public:
     void number(const std::string& name, const Number& value) {
         record_.numbers.emplace_back(name, static_cast<double>(value));
     }
+    template <class Number>
+    void optional_number(const std::string& name, const Number& value) {
+        if (value != 0) number(name, value);
+    }
     template <class Values>
     void array(const std::string& name, const Values& values, std::optional<Eigen::Index> = {}) {
         record_.arrays.push_back(tubule::array(name, values));
@@ -81,6 +85,12 @@ public:
             value = number_of(name);
         else
             value = static_cast<Number>(integer_of(name));
+    }
+    // 0 where it is missing: such numbers are written unless they are 0.
+    template <class Number>
+    void optional_number(const std::string& name, Number& value) const {
+        value = 0;
+        if (find_number(record_, name)) number(name, value);
     }
     void array(const std::string& name, std::vector<double>& values, std::optional<Eigen::Index> count = {}) const;
     void array(const std::string& name, Eigen::VectorXd& values, std::optional<Eigen::Index> count = {}) const;

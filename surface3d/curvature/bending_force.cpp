@@ -3,6 +3,7 @@
 #include <set>
 
 #include "common/geometry/profile_point.hpp"
+#include "surface3d/fem/places.hpp"
 #include "surface3d/fem/projection.hpp"
 
 namespace tubule::surface3d {
@@ -11,7 +12,8 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
                     const Bending& bending, const Eigen::VectorXd& H0) {
     // Summed up cell by cell, so that the answer does not depend on the number of threads.
     const int terms = static_cast<int>(count_terms(bending));
-    Eigen::MatrixXd of_cell(terms + 6, space.cells());
+    Eigen::MatrixXd of_cell(terms + 9, space.cells());
+    const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     const Tabulation& table = space.tabulation();
     space.for_each_cell([&](int cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell);
@@ -27,8 +29,17 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
             for_each_value_at(bending, h0, h, k, [&](std::size_t i, double value) { sum[i] += dS * value; });
             // The flux of (x, y, 0)/2, which also holds for a period of a tube.
             const double flux = p.x.head<2>().dot(p.normal.head<2>()) / 2;
-            const Eigen::Matrix<double, 6, 1> others{1, flux, h * h, k, magnitude(bending, h0, h, k), h};
-            sum.template tail<6>() += dS * others;
+            const PointPotential of_place(W, p.x);
+            const Eigen::Matrix<double, 9, 1> others{1,
+                                                     flux,
+                                                     h * h,
+                                                     k,
+                                                     magnitude(bending, h0, h, k),
+                                                     h,
+                                                     of_place.value,
+                                                     -of_place.slope[2],
+                                                     std::abs(of_place.value)};
+            sum.template tail<9>() += dS * others;
         }
     });
     const Eigen::VectorXd total = of_cell.rowwise().sum();
@@ -37,7 +48,8 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
     o.energy = o.energy_alpha = area_difference_energy(bending, o.M);
     for (int i = 0; i < terms; ++i) o.energy += o.energy_term.emplace_back(total[i]);
     o.area = total[terms], o.volume = total[terms + 1], o.integral_H2 = total[terms + 2];
-    o.integral_K = total[terms + 3], o.magnitude = total[terms + 4] + o.energy_alpha;
+    o.integral_K = total[terms + 3], o.magnitude = total[terms + 4] + o.energy_alpha + total[terms + 8];
+    o.potential = total[terms + 6], o.potential_force = total[terms + 7], o.energy += o.potential;
     return o;
 }
 

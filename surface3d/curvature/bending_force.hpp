@@ -13,11 +13,13 @@ struct Observables {
     std::vector<double> energy_term;  // of each term, see term_names()
     double energy = 0, area = 0, volume = 0;
     double M = 0, integral_H2 = 0, integral_K = 0;  // M = INT H
+    double potential = 0, potential_force = 0;      // INT W, part of the energy, and -INT W_z
     double energy_alpha = 0;                        // of area differences, theory.md (2.19), part of the energy
     double magnitude = 0;  // INT SUM |k| magnitude(H, K), see BendingTerm: E_ref is at least this
 };
 
-// The energy is INT f(H, K) dS + alpha/2 (M - M0)^2 with the recovered fields H, K; `H0` at the nodes, where it varies.
+// The energy is INT f(H, K) + W dS + alpha/2 (M - M0)^2, W of potentials of places, with the recovered fields H, K;
+// `H0` at the nodes, where it varies.
 Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
                     const Bending& bending, const Eigen::VectorXd& H0 = {});
 

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "common/energy/principal_symbol.hpp"
+#include "surface3d/fem/places.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -313,28 +314,6 @@ void DiscreteEnergy::set_penalty(const CurvedMesh& mesh, const Bending& bending)
     }
 }
 
-namespace {
-
-// W at a point of a frame, which is a tension that varies, and its derivatives by the place.
-struct PointPotential {
-    double value = 0;
-    Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-
-    PointPotential(const std::optional<Formula>& W, const Eigen::Vector3d& x) {
-        if (!W) return;
-        using J = Jet<double, 3, 2>;
-        const J place[]{J::variable(x[0], 0), J::variable(x[1], 1), J::variable(x[2], 2)}, w = evaluate(*W, place);
-        value = w.v;
-        for (int i = 0; i < 3; ++i) {
-            slope[i] = w.d[i];
-            for (int j = 0; j < 3; ++j) second(i, j) = w.dd[packed<3>(i, j)];
-        }
-    }
-};
-
-}  // namespace
-
 // Long: the integrands of all functionals, in the order in which their derivatives need each other.
 void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
                                 const std::optional<Formula>& potential, double sigma, double lambda,
@@ -544,20 +523,6 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
         }
     }
     return out;
-}
-
-double DiscreteEnergy::place_integral(const CurvedMesh& mesh, const Formula& W, double P) const {
-    const Tabulation& table = space_.tabulation();
-    double sum = 0;
-    for (int cell = 0; cell < space_.cells(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        for (int q = 0; q < table.points(); ++q) {
-            const SurfacePoint<double> p = tangent_point(X, table, q);
-            const double place[]{p.x[0], p.x[1], p.x[2], P};
-            sum += table.weight[q] * p.area * evaluate(W, place);
-        }
-    }
-    return sum;
 }
 
 Eigen::VectorXd DiscreteEnergy::place_slope(const CurvedMesh& mesh, const Directions& directions, const Formula& W,

@@ -60,8 +60,7 @@ public:
     EnergyDerivatives derivatives(const CurvedMesh& mesh, const Directions& directions, const Bending& bending,
                                   double sigma, double lambda, const Eigen::VectorXd& H0 = {},
                                   bool second = true) const;
-    // INT W dS of a density of the place x, y, z and of a number P; and its derivatives in the displacements.
-    double place_integral(const CurvedMesh& mesh, const Formula& W, double P) const;
+    // The derivatives of place_integral() in the displacements.
     Eigen::VectorXd place_slope(const CurvedMesh& mesh, const Directions& directions, const Formula& W, double P) const;
     // INT w_i w_j (n.nu)^2 dS
     Eigen::SparseMatrix<double> mass(const CurvedMesh& mesh, const Directions& directions) const;

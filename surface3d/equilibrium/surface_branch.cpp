@@ -14,7 +14,7 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr double finer_by = 1.8;      // triangles of a finer mesh over those of the one before
-constexpr double refined_bead = 0.5;  // before SurfaceSystem::coarsest_bead
+constexpr double refined_bead = 0.5;  // before coarsest_place
 
 // What Follower asks for. The unknowns are displacements of a base that follows the branch.
 class SurfaceTier {

@@ -119,7 +119,7 @@ private:
         return end(Stop::finished, "");
     }
 
-    bool resolved() const { return out_.beads.coarseness <= SurfaceSystem::coarsest_bead; }
+    bool resolved() const { return out_.beads.coarseness <= coarsest_place; }
 
     SurfaceEquilibrium end(Stop stop, std::string message) {
         out_.stop = stop, out_.message = std::move(message);

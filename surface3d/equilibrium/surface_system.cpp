@@ -50,26 +50,12 @@ Eigen::MatrixXd motions_of(const CurvedMesh& mesh, const VectorField& normal, co
 
 // Combinations of these motions, a column each, along which no potential of places changes.
 Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, const Middle& middle) {
-    constexpr int all = SurfaceSystem::most_motions, rigid = 6;
-    constexpr double nothing = 1e-10;  // of the mean square of the slope
+    constexpr int all = SurfaceSystem::most_motions;
     const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     if (!W) return Eigen::MatrixXd::Identity(all, all);
-    Eigen::MatrixXd changes(mesh.size(), rigid);
-    double slopes = 0;
-    for (int i = 0; i < mesh.size(); ++i) {
-        using J = Jet<double, 3, 1>;
-        const Eigen::Vector3d& x = mesh.nodes[i];
-        const J place[]{J::variable(x[0], 0), J::variable(x[1], 1), J::variable(x[2], 2)}, w = evaluate(*W, place);
-        const Eigen::Vector3d slope(w.d[0], w.d[1], w.d[2]), from = (x - middle.centre) / middle.size;
-        changes.row(i) << slope.transpose(), from.cross(slope).transpose();
-        slopes += slope.squaredNorm();
-    }
-    const Eigenpairs gram = eigenpairs(changes.transpose() * changes, true);
-    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, 0);
-    for (int j = 0; j < rigid && gram.values[j] <= nothing * slopes; ++j) {
-        out.conservativeResize(Eigen::NoChange, j + 1);
-        out.col(j) << gram.vectors.col(j), Eigen::VectorXd::Zero(all - rigid);
-    }
+    const Eigen::MatrixXd rigid = unmoved_by(*W, mesh, middle.centre, middle.size);
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, rigid.cols());
+    out.topRows(rigid.rows()) = rigid;
     return out;
 }
 
@@ -218,45 +204,14 @@ Bending SurfaceSystem::bending(const Eigen::VectorXd& u) const {
     return out;
 }
 
-namespace {
-
-// The ends of the surface along the axis, outward: where beads are looked for.
-std::array<double, 2> poles(const CurvedMesh& mesh) {
-    double low = HUGE_VAL, high = -HUGE_VAL;
-    for (const Eigen::Vector3d& x : mesh.nodes) low = std::min(low, x.z()), high = std::max(high, x.z());
-    return {-low, high};
-}
-
-}  // namespace
-
-double bead_distance(const CurvedMesh& mesh, const Bending& bending, double width) {
-    const DiscreteEnergy energy(mesh, bending);
-    const BeadEquations beads(width, BeadEquations::in_space);
-    const BeadSurface on{[&](const Formula& W, double P) { return energy.place_integral(mesh, W, P); }, {}};
-    return BeadEquations::distance(beads.numbers(on, poles(mesh), 0));
-}
-
 BeadSurface SurfaceSystem::on(const Eigen::VectorXd& u) const {
     const auto at = std::make_shared<const CurvedMesh>(mesh(u));
-    return {[this, at](const Formula& W, double P) { return energy_->place_integral(*at, W, P); },
+    return {[this, at](const Formula& W, double P) { return place_integral(space(), *at, W, P); },
             [this, at](const Formula& W, double P) { return energy_->place_slope(*at, directions_, W, P); }};
 }
 
 double SurfaceSystem::bead_coarseness(const Eigen::VectorXd& u) const {
-    if (!beads_) return 0;
-    constexpr double near = 2;  // widths
-    const TriangleMesh at = corner_triangles(mesh(u));
-    const BeadNumbers numbers = bead_numbers(u);
-    double longest = 0;
-    for (const auto& corner : at.triangles) {
-        double distance = HUGE_VAL;
-        for (const int c : corner)
-            for (const double z : {-numbers[0], numbers[2]})
-                distance = std::min(distance, (at.points[c] - z * Eigen::Vector3d::UnitZ()).norm());
-        for (int c = 0; c < 3 && distance < near * beads_->width(); ++c)
-            longest = std::max(longest, (at.points[corner[(c + 1) % 3]] - at.points[corner[c]]).norm());
-    }
-    return longest / (beads_->width() * base_.order);
+    return beads_ ? surface3d::bead_coarseness(mesh(u), bead_numbers(u), beads_->width()).value : 0;
 }
 
 double SurfaceSystem::length(const Eigen::VectorXd& u) const {
@@ -405,9 +360,7 @@ bool SurfaceSystem::admissible(const Eigen::VectorXd& u) const {
     if (!u.allFinite()) return false;
     const CurvedMesh at = mesh(u);
     if ((base_.period > 0 && !(at.period > 0)) || !(mesh_quality(at).worst > least_admissible)) return false;
-    for (const Potential& wall : problem_.bending.potentials)
-        for (const Eigen::Vector3d& x : at.nodes)
-            if (wall.is_wall() && !(wall.distance(std::hypot(x[0], x[1]), x[2]) > 0)) return false;
+    if (!(wall_distance(at, problem_.bending.potentials).value > 0)) return false;
     const EnergyValues v = energy_->values(at, problem_.bending, H0_);
     return std::isfinite(v.energy) && v.kinks < most_kinks * scale_;
 }

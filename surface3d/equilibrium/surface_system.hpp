@@ -6,18 +6,18 @@
 #include <optional>
 #include <vector>
 
-#include "common/energy/bead_equations.hpp"
 #include "common/equilibrium/stationary_problem.hpp"
 #include "common/solve/bordered_ldlt.hpp"
 #include "surface3d/equilibrium/discrete_energy.hpp"
 #include "surface3d/equilibrium/surface_spectrum.hpp"
+#include "surface3d/fem/places.hpp"
 
 namespace tubule::surface3d {
 
 // The beads of a surface, zeros without any.
 struct BeadState {
     BeadNumbers numbers = BeadNumbers::Zero();
-    double force = 0, coarseness = 0;  // see SurfaceSystem::bead_coarseness()
+    double force = 0, coarseness = 0;  // see fem/places.hpp
 };
 
 // u holds the displacements w_i along the normals of a base mesh, of a free period the stretch, then sigma, lambda, mu
@@ -27,7 +27,6 @@ struct BeadState {
 class SurfaceSystem {
 public:
     static constexpr int most_motions = 10;
-    static constexpr double coarsest_bead = 0.6;  // see bead_coarseness(): docs/decisions/equilibria.md
 
     // Throws as check_problem(). H0: at the nodes, where it varies.
     SurfaceSystem(const CurvedMesh& base, const StationaryProblem& problem, const Eigen::VectorXd& H0 = {});
@@ -122,9 +121,6 @@ private:
     mutable Eigen::VectorXd at_;
     mutable std::optional<EnergyDerivatives> last_;
 };
-
-// The distance of beads of this width on a closed surface.
-double bead_distance(const CurvedMesh& mesh, const Bending& bending, double width);
 
 // Unit normals at the nodes: means over the triangles around them.
 VectorField node_normals(const SurfaceSpace& space, const CurvedMesh& mesh);

@@ -9,10 +9,11 @@
 namespace tubule::surface3d {
 
 struct RemeshOptions {
-    int triangles = 0;     // about this many, or more where `angle` requires them; 0: as many as there are
-    double angle = 0.5;    // edges are about this over the largest principal curvature, or shorter
-    double growth = 0.33;  // an edge is longer than another by at most this times their distance
-    double quality = 0.3;  // that every cell must have (mesh_quality)
+    int triangles = 0;             // about this many, or more where `angle` requires them; 0: as many as there are
+    double angle = 0.5;            // edges are about this over the largest principal curvature, or shorter
+    double growth = 0.33;          // an edge is longer than another by at most this times their distance
+    double quality = 0.3;          // that every cell must have (mesh_quality)
+    Eigen::VectorXd largest = {};  // edges at the nodes of the old mesh, where it is not empty
 };
 
 struct Remeshed {

@@ -79,7 +79,8 @@ MeshSizes mesh_sizes(const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eig
     MeshSizes sizes;
     sizes.width.resize(mesh.size());
     for (int i = 0; i < mesh.size(); ++i)
-        sizes.width[i] = std::min(options.angle / largest_curvature(H[i], K[i]), largest_over_even * even);
+        sizes.width[i] = std::min({options.angle / largest_curvature(H[i], K[i]), largest_over_even * even,
+                                   options.largest.size() > 0 ? options.largest[i] : HUGE_VAL});
     int narrowest;
     const double smallest = sizes.width.minCoeff(&narrowest);
     limit_growth(mesh, options.growth, sizes.width);

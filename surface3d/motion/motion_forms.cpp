@@ -53,6 +53,7 @@ struct CellWork {
     Eigen::MatrixXd weighted2, weighted1;  // rows of grad and phi times what stands at the point
     Eigen::MatrixXd block;
     Eigen::VectorXd rhs, flux, widening, turning, load, force, row, column;
+    Eigen::Matrix<double, Eigen::Dynamic, 4> beads;
     double own = 0, energy = 0, M = 0;  // of a stretch
 };
 
@@ -66,6 +67,7 @@ public:
           bending_(with_M(bending, base.M)),
           base_(base),
           table_(space.tabulation()),
+          W_(potential_density_in_space(bending.potentials)),
           pressure_table_(space.tabulation(unknowns.p < 0 ? 1 : unknowns.last_mesh().order)),
           n_(space.width()),
           nv_(law.components() * n_),
@@ -78,7 +80,7 @@ public:
     void sum_stretch(StepSystem& system) const;
 
 private:
-    // The state at a point.
+    // The state at a point. Many fields: all that the forms of a cell have there.
     struct Point {
         double dS, width, H, K, B2, trace;
         Eigen::Vector3d normal;         // continuous
@@ -89,17 +91,41 @@ private:
         // What the slope of H0 adds to grad f_H + S grad f_K; the force along the surface, and its derivatives in H and
         // K.
         Eigen::Vector2d bend, push, push_H, push_K;
+        // Potentials of places; the densities of G and dG/dP of each bead; all that acts, at fixed positions of beads.
+        PointPotential W, of_beads[4], places;
     };
+    // By how much X* is expected to be ahead along the normal of where u = 0 would leave the surface.
+    struct ExpectedMotion {
+        CellColumns<3> moved;  // u* te - w* te + X* - Xbar, of which the normal part counts
+        CellColumns<1> along;  // where nothing flows: te u*.nu
+        struct Height {
+            double value;
+            Eigen::Vector2d slope;
+        };
+        template <class Phi, class Grad>
+        Height at(const Point& s, const Phi& phi, const Grad& grad) const {
+            const Eigen::Vector3d d = moved * phi;
+            return {s.normal.dot(d) + along.dot(phi),
+                    grad * (moved.transpose() * s.normal + along.transpose()) - s.B * d};
+        }
+    };
+
+    // W_nu - W H, theory.md (2.22), of which the force is the negative.
+    static double variation(const PointPotential& W, const Point& s) {
+        return W.slope.dot(s.normal) - W.value * s.trace;
+    }
 
     void size(CellWork& work) const;
     Point point(const SurfacePoint<double>& p, const CellColumns<3>& gradient, const CellColumns<3>& normals, int cell,
                 int q) const;
     void fill_tables(const Point& at, const CellColumns<3>& gradient, int q, CellTables& t) const;
+    ExpectedMotion expected_motion(int cell) const;
     void add_advection(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_varying_H0(const std::vector<Point>& at, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
+    void add_places(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_stretch(const std::vector<Point>& at, CellWork& work) const;
 
@@ -109,6 +135,7 @@ private:
     const Bending bending_;
     const StepBase& base_;
     const Tabulation& table_;
+    const std::optional<Formula> W_;
     Tabulation pressure_table_;
     int n_, nv_, H_, K_, p_;                // nodes and velocities of a cell, first columns of its blocks
     std::vector<Eigen::Vector3d> of_cell_;  // own, energy and M of a stretch: their sum does not depend on the threads
@@ -126,7 +153,7 @@ void Assembler::size(CellWork& work) const {
     }
     work.weighted1.resize(Q, n_), work.weighted2.resize(2 * Q, n_);
     work.block.setZero(w, w), work.rhs.setZero(w), work.flux.setZero(w), work.widening.setZero(w);
-    work.turning.setZero(w), work.load.setZero(w), work.force.setZero(w);
+    work.turning.setZero(w), work.beads.setZero(base_.beads ? w : 0, 4), work.load.setZero(w), work.force.setZero(w);
     if (law_.free_period) work.row.setZero(w), work.column.setZero(w), work.own = work.energy = work.M = 0;
 }
 
@@ -154,6 +181,14 @@ Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColum
     const Eigen::Vector2d slope = at.e.transpose() * H0.slope;
     at.bend = H0.f0.H * slope + H0.f0.K * (at.S * slope);
     at.push = H0.f0.f * slope, at.push_H = H0.f0.H * slope, at.push_K = H0.f0.K * slope;
+    at.W = at.places = PointPotential(W_, p.x);
+    for (int k = 0; k < 2 && base_.beads; ++k) {
+        const double P = base_.bead_numbers[2 * k];
+        if (!is_in_reach(p.x, k == 0 ? -P : P, base_.beads->width())) continue;
+        at.of_beads[2 * k] = PointPotential(base_.beads->density(k), p.x, P);
+        at.of_beads[2 * k + 1] = PointPotential(base_.beads->density_by_P(k), p.x, P);
+        at.places.add(base_.force * base_.bead_numbers[2 * k + 1], at.of_beads[2 * k]);
+    }
     return at;
 }
 
@@ -182,6 +217,19 @@ void Assembler::fill_tables(const Point& at, const CellColumns<3>& gradient, int
         t.strain(3 * q + 2, columns) = (e1 * g.row(1) + e2 * g.row(0)) / std::sqrt(2.0);
         if (p_ >= 0) t.divergence(q, columns) = e1 * g.row(0) + e2 * g.row(1);
     }
+}
+
+Assembler::ExpectedMotion Assembler::expected_motion(int cell) const {
+    ExpectedMotion out{CellColumns<3>(3, n_), CellColumns<1>::Zero(1, n_)};
+    for (int a = 0; a < n_; ++a) {
+        const int i = space_.node(cell, a);
+        out.moved.col(a) = base_.displacement.col(i) - base_.te * base_.mesh_velocity.col(i);
+        if (law_.flows)
+            for (int d = 0; d < 3; ++d) out.moved(d, a) += base_.te * base_.velocity[d * unknowns_.nodes() + i];
+        else
+            out.along[a] = base_.te * base_.velocity[i];
+    }
+    return out;
 }
 
 void Assembler::add_advection(const std::vector<Point>& at, int cell, CellWork& work) const {
@@ -244,7 +292,7 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
         block.noalias() += t.normal.transpose() * work.weighted1;
     };
     const auto in_H = [&](const Point& s) {
-        return s.B2 * s.f.HH + s.trace * s.K * s.f.HK - s.trace * s.f.H - base_.tension;
+        return s.B2 * s.f.HH + s.trace * s.K * s.f.HK - s.trace * s.f.H - base_.tension - s.places.value;
     };
     const auto in_K = [](const Point& s) { return s.B2 * s.f.HK + s.trace * s.K * s.f.KK - s.trace * s.f.K; };
     add(
@@ -253,13 +301,15 @@ void Assembler::add_bending(const std::vector<Point>& at, int cell, CellWork& wo
         K_, [](const Point& s) { return Eigen::Matrix2d(s.f.HK * Eigen::Matrix2d::Identity() + s.f.KK * s.S); }, in_K);
     for (int q = 0; q < Q; ++q) {
         const Point& s = at[q];
-        double known = s.B2 * s.f.H + s.trace * s.K * s.f.K - s.trace * s.f.f;
+        double known = s.B2 * s.f.H + s.trace * s.K * s.f.K - s.trace * s.f.f + variation(s.W, s);
         if (H_ >= 0) known -= in_H(s) * s.H;
         if (K_ >= 0) known -= in_K(s) * s.K;
         work.rhs.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.force.head(nv_) -= (s.dS * known) * t.normal.row(q).transpose();
         work.flux.head(nv_) += s.dS * t.normal.row(q).transpose();
         if (bending_.alpha) work.turning.head(nv_) += (s.dS * (s.B2 - s.trace * s.H)) * t.normal.row(q).transpose();
+        for (int i = 0; i < work.beads.size() / unknowns_.width(); ++i)
+            work.beads.col(i).head(nv_) += (s.dS * variation(s.of_beads[i], s)) * t.normal.row(q).transpose();
         if (!law_.inextensible) work.widening.head(nv_) -= (s.dS * s.H) * t.normal.row(q).transpose();
     }
     if (H_ >= 0) work.force.head(nv_) -= work.block.block(0, H_, nv_, n_) * space_.gather(base_.fields.H, cell);
@@ -314,6 +364,26 @@ void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const
     work.block.block(p_, p_, n_p, n_p).noalias() += t.psi_grad.transpose() * slope;
 }
 
+// How the force of densities W of places, -(W_nu - W H, v.nu) of theory.md (2.22), changes as the surface moves by xi
+// along the normal: -(W_nunu - W_nu H) xi + grad W.grad xi; what H adds is implicit with it, as of a tension.
+void Assembler::add_places(const std::vector<Point>& at, int cell, CellWork& work) const {
+    if (!W_ && !base_.beads) return;
+    const CellTables& t = work.t;
+    const ExpectedMotion moved = expected_motion(cell);
+    Eigen::MatrixXd changes(table_.points(), nv_);
+    for (int q = 0; q < table_.points(); ++q) {
+        const Point& s = at[q];
+        const PointPotential& W = s.places;
+        const double stiffness = s.normal.dot(W.second * s.normal) - W.slope.dot(s.normal) * s.trace;
+        const Eigen::Vector2d along = s.e.transpose() * W.slope;
+        changes.row(q) =
+            (s.dS * base_.te) * (stiffness * t.normal.row(q) - along.transpose() * t.normal_grad.middleRows<2>(2 * q));
+        const auto [height, slope] = moved.at(s, table_.value.col(q), t.grad.middleRows<2>(2 * q));
+        work.rhs.head(nv_) += (s.dS * (stiffness * height - along.dot(slope))) * t.normal.row(q).transpose();
+    }
+    work.block.topLeftCorner(nv_, nv_).noalias() += t.normal.transpose() * changes;
+}
+
 // (H, phi) + te (c.grad (H - H*), phi) + te L_H(u) = (H*, phi) + L_H(X* - Xbar) + te L_H(u* - w*), K alike, with
 // c = u* - w* along the surface if there is inertia, else 0, L_H on the left and of X* - Xbar and u* - w* taken
 // 1 + curvature_stabilisation |B| (width) times, and what a velocity makes of them:
@@ -323,18 +393,7 @@ void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const
 void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const {
     const CellTables& t = work.t;
     const int Q = table_.points();
-    // u* te - w* te + X* - Xbar, of which the normal part counts.
-    CellColumns<3> moved(3, n_);
-    CellColumns<1> along(1, n_);  // where nothing flows: te u*.nu
-    for (int a = 0; a < n_; ++a) {
-        const int i = space_.node(cell, a);
-        moved.col(a) = base_.displacement.col(i) - base_.te * base_.mesh_velocity.col(i);
-        along[a] = 0;
-        if (law_.flows)
-            for (int d = 0; d < 3; ++d) moved(d, a) += base_.te * base_.velocity[d * unknowns_.nodes() + i];
-        else
-            along[a] = base_.te * base_.velocity[i];
-    }
+    const ExpectedMotion moved = expected_motion(cell);
     const auto add = [&](int rows, const Eigen::VectorXd& known, const auto& gradient, const auto& value) {
         if (rows < 0) return;
         for (int q = 0; q < Q; ++q) {
@@ -342,9 +401,7 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
             const auto phi = table_.value.col(q);
             const auto g = t.grad.middleRows<2>(2 * q);
             const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_cell_nodes> Sg = gradient(s) * g;
-            const Eigen::Vector3d d = moved * phi;
-            const Eigen::Vector2d slope = g * (moved.transpose() * s.normal + along.transpose()) - s.B * d;
-            const double height = s.normal.dot(d) + along.dot(phi);
+            const auto [height, slope] = moved.at(s, phi, g);
             work.rhs.segment(rows, n_) += s.dS * (Sg.transpose() * slope - value(s) * height * phi);
             work.weighted2.middleRows<2>(2 * q) = (base_.te * s.dS) * Sg;
             work.weighted1.row(q) = (base_.te * s.dS * value(s)) * t.phi.row(q);
@@ -417,6 +474,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
     add_bending(at, cell, work);
     add_varying_H0(at, work);
     add_pressure(at, work);
+    add_places(at, cell, work);
     add_curvature_evolution(at, cell, work);
     add_stretch(at, work);
     unknowns_.add(system.A, cell, work.block);
@@ -427,6 +485,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
         system.flux[numbers[i]] += work.flux[i];
         system.widening[numbers[i]] += work.widening[i];
         system.turning[numbers[i]] += work.turning[i];
+        if (base_.beads) system.beads.row(numbers[i]) += work.beads.row(i);
         system.pressure_load[numbers[i]] += work.load[i];
         system.force[numbers[i]] += work.force[i];
     }
@@ -459,6 +518,7 @@ void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const S
     system.pressure_load.setZero(unknowns.size());
     system.widening.setZero(unknowns.size());
     system.turning.setZero(unknowns.size());
+    system.beads.setZero(base.beads ? unknowns.size() : 0, 4);
     system.force.setZero(unknowns.size());
     if (law.free_period) system.stretch.row.setZero(unknowns.size()), system.stretch.column.setZero(unknowns.size());
     Assembler assembler(space, unknowns, law, bending, base);

@@ -5,6 +5,7 @@
 
 #include "common/energy/bending.hpp"
 #include "surface3d/fem/field_unknowns.hpp"
+#include "surface3d/fem/places.hpp"
 #include "surface3d/motion/extent.hpp"
 #include "surface3d/motion/motion_fields.hpp"
 #include "surface3d/motion/surface_law.hpp"
@@ -34,7 +35,11 @@ struct StepBase {
     double curvature_stabilisation = 0;  // L_H is taken 1 + this * |B| (width of a triangle) times
     double tension = 0;  // expected: its part in the force changes with H at once, -tension (H - H*, v.nu)
     double stretch = 0;  // in X* - Xbar, of a free period
-    double M = 0;        // INT H of X*
+    // Beads on X*, null without; their positions with multipliers for a force of 1; and the force, given or expected.
+    const BeadEquations* beads = nullptr;
+    BeadNumbers bead_numbers = BeadNumbers::Zero();
+    double force = 0;
+    double M = 0;  // INT H of X*
 };
 
 // What belongs to the stretch e of a free period, u = .. + e z e_z: theory.md (3.19), (10.18).
@@ -53,7 +58,10 @@ struct StepSystem {
     Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
     Eigen::VectorXd widening;       // the rate of the area, -(H*, v.nu); of extensible membranes
     Eigen::VectorXd turning;        // the rate of M = INT H, -(2 K, u.nu): theory.md (2.20)
-    Eigen::VectorXd force;          // (b, v) on X*, in the rows of the velocity
+    // Of each bead the rates of G and dG/dP, theory.md (2.23), and of their distance.
+    Eigen::Matrix<double, Eigen::Dynamic, 4> beads;
+    Eigen::VectorXd pulling(const BeadNumbers& at) const { return -at[1] * beads.col(0) - at[3] * beads.col(2); }
+    Eigen::VectorXd force;  // (b, v) on X*, of potentials, too, in the rows of the velocity
     StretchTerms stretch;
     Eigen::SparseMatrix<double>
         advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia

@@ -85,9 +85,17 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 }
 
 void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
+    for (const Potential& p : bending.potentials) {
+        if (p.is_wall()) continue;
+        FormulaDomain domain(*p.formula);
+        for (int i = 0; i < mesh.size() && domain.restricted(); ++i) domain.look({mesh.nodes[i].data(), 3}, i);
+        if (const auto margin = domain.margin(); !(margin.value >= m.domain.value)) m.domain = margin;
+    }
+    if (m.domain.step) m.least_defined = mesh.nodes[static_cast<std::size_t>(m.domain.place)];
     DensityDomain domain(bending);
     if (!domain.restricted()) return;
     for (int i = 0; i < mesh.size(); ++i) domain.look(m.fields.H0_at(bending, i), m.fields.H[i], m.fields.K[i], i);
+    if (!(domain.margin().value < m.domain.value)) return;
     m.domain = domain.margin();
     m.least_defined = mesh.nodes[static_cast<std::size_t>(m.domain.place)];
 }
@@ -135,12 +143,21 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
         const Eigen::RowVectorXd load = surface.flux(s.u, mesh, m.fields).transpose();
         m.dissipation = law.friction * load.dot(s.u) + sum[14] / law.friction;
     }
-    m.free_energy = m.bending.energy + law.potential(s.time, {m.bending.area, m.bending.volume, s.period});
+    m.length = s.period;
+    if (law.beads) {
+        const BeadNumbers beads = surface.bead_numbers(mesh);
+        m.length = BeadEquations::distance(beads);
+        m.coarse_bead = bead_coarseness(mesh, beads, law.beads->width);
+    }
+    m.wall = wall_distance(mesh, bending.potentials), m.coarse_wall = wall_coarseness(mesh, bending.potentials);
+    m.free_energy = m.bending.energy + law.potential(s.time, {m.bending.area, m.bending.volume, m.length});
     m.tension = law.area_is_free() ? law.tension.at(s.time) : law.keeps_area ? s.tension : -sum[15] / m.bending.area;
     m.pressure = law.keeps_volume ? -s.lambda : loads_at(law, s.time).pressure_at(m.bending.volume);
     m.pressure_domain = pressure_domain(law, m.bending.volume);
-    m.force = law.free_period ? law.force.at(s.time)
-                              : axial_force(surface, s, m.fields, m.velocity, m.bending.M, m.tension, m.pressure);
+    m.force = law.holds_distance() ? s.force
+              : law.free_period || law.beads
+                  ? law.force.at(s.time)
+                  : axial_force(surface, s, m.fields, m.velocity, m.bending.M, m.tension, m.pressure);
     m.acceleration = law.inertia * sum[4] / 2;
     m.speed = m.velocity.colwise().norm().maxCoeff();
     m.stretching = sum[2] > 0 ? std::sqrt(sum[3] / sum[2]) : 0;

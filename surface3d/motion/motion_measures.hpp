@@ -20,10 +20,13 @@ struct MotionMeasures {
     MotionFields fields;
     VectorField velocity;    // at the nodes
     double free_energy = 0;  // F = E + tension A - pressure V - force L, of what is given
-    // Given, or what holds the area, the volume and the period; 0 where that is undetermined.
+    // Given, or what holds the area, the volume and the period or the distance of beads; 0 where that is undetermined.
     double tension = 0, pressure = 0, force = 0;
-    double kinetic = 0;       // inertia INT |u|^2/2
-    double dissipation = 0;   // INT 2 viscosity |sigma|^2 + friction |u|^2
+    double length = 0;                    // the period, or the distance of beads
+    WallDistance wall;                    // from the walls of potentials
+    Coarseness coarse_wall, coarse_bead;  // of the mesh near them
+    double kinetic = 0;                   // inertia INT |u|^2/2
+    double dissipation = 0;               // INT 2 viscosity |sigma|^2 + friction |u|^2
     double acceleration = 0;  // inertia INT |d_t u|^2 dS/2: kinetic energy gained from rest, per time squared
     double speed = 0;         // largest |u|
     double stretching = 0;    // L2 norm of div_P u, relative to that of grad_P u: zero if inextensible

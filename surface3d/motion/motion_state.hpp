@@ -30,6 +30,7 @@ struct MotionState {
     Eigen::VectorXd p;               // pressure, at the nodes of its own order
     double lambda = 0;               // multiplier of the volume; 0 where that is free
     double tension = 0;              // multiplier of the area as a whole; 0 where that is free or p holds it
+    double force = 0;                // multiplier of the distance of beads; 0 where that is free
     double period = 0, stretch = 0;  // of a tube: length, and the rate at which it grows over itself
     // What the scheme that made the step keeps; null initially, and for schemes that keep nothing. Steps share it: it
     // is never modified, each step creates its own.
@@ -46,7 +47,7 @@ struct MotionStep {
 // Whether positions, velocities and multipliers are finite.
 inline bool is_finite(const MotionState& s) {
     return s.X.allFinite() && s.w.allFinite() && s.u.allFinite() && s.p.allFinite() && std::isfinite(s.lambda) &&
-           std::isfinite(s.tension) && std::isfinite(s.period) && std::isfinite(s.stretch);
+           std::isfinite(s.tension) && std::isfinite(s.force) && std::isfinite(s.period) && std::isfinite(s.stretch);
 }
 
 // by z e_z at the nodes.

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <vector>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/dense.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/motion/motion_forms.hpp"
 
@@ -15,6 +17,29 @@ constexpr int most_corrections = 5;
 constexpr double kept = 1e-12;            // area and volume, relative
 constexpr double still_kept = 1e-8;       // a larger defect rejects the step
 constexpr double slight_friction = 1e-4;  // relative to viscosity/area; used if nothing else resists rigid motions
+
+// Combinations of translations and rotations about the origin, or of a tube the axis, that no potential and no bead
+// resists: beads let a surface move along the axis and turn about it.
+Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, bool with_beads) {
+    constexpr int all = 6, along = 2, around = 5;
+    if (mesh.period > 0) return Eigen::MatrixXd::Identity(4, 4);
+    Eigen::MatrixXd out = Eigen::MatrixXd::Identity(all, all);
+    if (const auto W = potential_density_in_space(bending.potentials)) {
+        const double size = node_positions(mesh).cwiseAbs().maxCoeff();
+        out = unmoved_by(*W, mesh, Eigen::Vector3d::Zero(), size);
+        out.bottomRows(all / 2) /= size;
+    }
+    if (!with_beads) return out;
+    // Of these, the ones that are such a motion.
+    Eigen::MatrixXd along_axis = Eigen::MatrixXd::Zero(all, 0);
+    for (const int motion : {along, around}) {
+        const Eigen::VectorXd unit = Eigen::VectorXd::Unit(all, motion);
+        if (out.cols() == 0 || (out * least_squares(out, unit) - unit).norm() > 1e-6) continue;
+        along_axis.conservativeResize(Eigen::NoChange, along_axis.cols() + 1);
+        along_axis.rightCols(1) = unit;
+    }
+    return along_axis;
+}
 
 }  // namespace
 
@@ -28,13 +53,15 @@ MovingSurface::MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, cons
       mesh_motion_(control.follow_curvature) {
     if (const int order = pressure_order(law, mesh.order); order > 0)
         pressure_mesh_ = order == mesh.order ? mesh : with_order(mesh, order);
+    if (law.beads) beads_.emplace(law.beads->width, BeadEquations::in_space);
+    free_motions_ = free_motions(mesh, bending, beads_.has_value());
     if (law.viscosity == 0 || law.inertia != 0 || law.friction != 0) return;
     holds_rigid_motions_ = true;
     law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;
 }
 
-MotionState MovingSurface::start(const CurvedMesh& mesh) {
-    MotionState s;
+MotionState MovingSurface::start(const CurvedMesh& mesh, double time) {
+    MotionState s{.time = time};
     s.X = node_positions(mesh), s.period = mesh.period;
     s.w = VectorField::Zero(3, mesh.size());
     s.u = Eigen::VectorXd::Zero(law_.components() * mesh.size());
@@ -44,14 +71,36 @@ MotionState MovingSurface::start(const CurvedMesh& mesh) {
     return s;
 }
 
-MotionState MovingSurface::start(const CurvedMesh& at, const Eigen::VectorXd& u, const Eigen::VectorXd& momenta) {
-    MotionState s = start(at);
+MotionState MovingSurface::start(const CurvedMesh& at, const Eigen::VectorXd& u, const Eigen::VectorXd& momenta,
+                                 double time) {
+    MotionState s = start(at, time);
     s.u = u;
     keep_momenta(momenta, 0, s);
     const CurvedMesh now = mesh(s);
     const MotionFields f = fields(now);
     s.w = node_velocity(s, now, f, flux(s.u, now, f), control_.relaxation);
     return s;
+}
+
+BeadNumbers MovingSurface::bead_numbers(const CurvedMesh& mesh) const {
+    const BeadNumbers out = surface3d::bead_numbers(space_, mesh, *beads_, 1);
+    if (!out.allFinite()) throw SolveError("a bead has lost the membrane at its pole");
+    return out;
+}
+
+double MovingSurface::bead_bend(const CurvedMesh& mesh, int bead, double P) const {
+    const BeadSurface on{[&](const Formula& W, double at) { return place_integral(space_, mesh, W, at); }, {}};
+    return beads_->slopes_in_P(on, bead, P)[1];
+}
+
+double MovingSurface::distance_rate(const CurvedMesh& mesh, const BeadNumbers& at, const VectorField& v) const {
+    double sum = 0;
+    for (int k = 0; k < 2; ++k) sum -= at[2 * k + 1] * place_rate(space_, mesh, beads_->density(k), at[2 * k], v);
+    return sum;
+}
+
+double MovingSurface::length(const CurvedMesh& mesh) const {
+    return beads_ ? BeadEquations::distance(bead_numbers(mesh)) : mesh.period;
 }
 
 CurvedMesh MovingSurface::mesh(const VectorField& X, double period) const {
@@ -143,7 +192,8 @@ Eigen::MatrixXd MovingSurface::rigid_motions(const CurvedMesh& mesh) const {
     return rigid_motions(at, mesh.period > 0);
 }
 
-// Velocities, a column each, component by component: translations, and rotations that the surface allows.
+// Velocities, a column each, component by component: translations, and rotations that the surface allows; of these
+// what nothing at places resists.
 Eigen::MatrixXd MovingSurface::rigid_motions(const Places& at, bool tube) const {
     const int n = nodes();
     Eigen::MatrixXd out(3 * n, tube ? 4 : 6);
@@ -159,7 +209,7 @@ Eigen::MatrixXd MovingSurface::rigid_motions(const Places& at, bool tube) const 
                 to = (e[j] * at.row(1 + k) - e[k] * at.row(1 + j)).transpose();
         }
     }
-    return out;
+    return out * free_motions_;
 }
 
 // (r, v) of these motions r: momentum and angular momentum of a velocity v, except for the density. P_k holds 1 and x,
@@ -194,7 +244,7 @@ Eigen::VectorXd MovingSurface::momenta_after(const MotionState& from, const Moti
 // Only friction changes momentum and angular momentum, but the discrete bending force has a small resultant, which
 // would accelerate a surface at rest: a rigid motion cancels it without a change of shape.
 void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionState& to) const {
-    if (kept.size() == 0) return;
+    if (kept.size() == 0 || free_motions_.cols() == 0) return;
     const CurvedMesh m = mesh(to);
     const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m);
     const Eigen::VectorXd lack = kept - of.transpose() * to.u;
@@ -220,62 +270,92 @@ bool MovingSurface::area_is_volume(const CurvedMesh& mesh, const MotionFields& f
     return variation < control_.least_variation && std::abs(lack_of_volume(mesh)) < control_.most_drift;
 }
 
-// How much conserved area and volume have lost; 0 of what is not conserved.
-Extent MovingSurface::lack(const CurvedMesh& mesh) const {
-    const Extent now = extent(space_, mesh);
-    return {control_.area && !law_.area_is_free() ? *control_.area - now.area : 0,
-            control_.volume && law_.keeps_volume ? *control_.volume - now.volume : 0};
+// Where their distance is held.
+BeadNumbers MovingSurface::held_beads(const CurvedMesh& mesh) const {
+    return law_.holds_distance() ? bead_numbers(mesh) : BeadNumbers(BeadNumbers::Zero());
 }
 
-Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const CurvedMesh& begin, const CurvedMesh& end, double span,
-                                   const Extent& missed) const {
+// How much area, volume and distance that are kept have lost; 0 of what is not kept.
+Extent MovingSurface::lack(const CurvedMesh& mesh, double time, const BeadNumbers& beads) const {
+    const Extent now = extent(space_, mesh);
+    const double distance = law_.holds_distance() ? control_.distance + law_.beads->extension->at(time) : 0;
+    return {control_.area && !law_.area_is_free() ? *control_.area - now.area : 0,
+            control_.volume && law_.keeps_volume ? *control_.volume - now.volume : 0,
+            law_.holds_distance() ? distance - BeadEquations::distance(beads) : 0};
+}
+
+Extent MovingSurface::rate_of(const CurvedMesh& mesh, const BeadNumbers& beads, const VectorField& v) const {
+    Extent out = extent_rate(space_, mesh, v);
+    if (law_.holds_distance()) out.length = distance_rate(mesh, beads, v);
+    return out;
+}
+
+Extent MovingSurface::rate_to_keep(const CurvedMesh& at, const CurvedMesh& begin, const CurvedMesh& end, double time,
+                                   double span, const Extent& missed) const {
     const double stretch = at.period > 0 ? (end.period - begin.period) / at.period : 0;
     const VectorField moved = node_positions(end) - node_positions(begin) - stretched(node_positions(at), stretch);
-    const Extent lacks = lack(end), back = extent_rate(space_, at, moved);
+    const Extent lacks = lack(end, time, held_beads(end)), back = rate_of(at, held_beads(at), moved);
     const Extent along = stretch != 0 ? stretch_rate(space_, at) : Extent{};
     return {(lacks.area + back.area + stretch * along.area + missed.area) / span,
-            (lacks.volume + back.volume + stretch * along.volume + missed.volume) / span};
+            (lacks.volume + back.volume + stretch * along.volume + missed.volume) / span,
+            (lacks.length + back.length) / span};
 }
 
-// Newton's method for two numbers: displacements along nu and H nu, those of the expected surface; or along nu and
-// z e_z, by which a straight tube meets both.
+// The displacement along the normal in proportion to what a pull of the beads exerts there.
+VectorField MovingSurface::pulled(const MotionFields& f, const CurvedMesh& mesh, const BeadNumbers& numbers) const {
+    VectorField out = f.normal;
+    for (int i = 0; i < mesh.size(); ++i) {
+        double pull = 0;
+        for (int k = 0; k < 2; ++k) {
+            const PointPotential at(beads_->density(k), mesh.nodes[i], numbers[2 * k]);
+            pull += numbers[2 * k + 1] * (at.value * f.H[i] - at.slope.dot(f.normal.col(i)));
+        }
+        out.col(i) *= pull;
+    }
+    return out;
+}
+
+// Newton's method for up to three numbers: displacements along nu and H nu, those of the expected surface, or along nu
+// and z e_z, by which a straight tube meets both; and along nu near the beads.
 MovingSurface::Correction MovingSurface::correct(const MotionFields& f, bool with_volume, MotionState& s) const {
-    const bool area = !law_.area_is_free() && control_.area, volume = with_volume && control_.volume;
+    const bool area = !law_.area_is_free() && control_.area, volume = with_volume && control_.volume,
+               distance = law_.holds_distance();
     Correction out{VectorField::Zero(3, s.X.cols()), 0, {}};
-    if (!area && !volume) return out;
+    if (!area && !volume && !distance) return out;
     const bool stretches = area && volume && law_.free_period;
-    const VectorField by_normal = f.normal, by_H = f.normal * f.H.asDiagonal(), X = s.X;
+    std::vector<VectorField> along;
+    if (volume) along.push_back(f.normal);
+    if (area && !stretches) along.push_back(f.normal * f.H.asDiagonal());
+    if (distance) along.push_back(pulled(f, mesh(s), bead_numbers(mesh(s))));
+    const auto kept_of = [&](const Extent& e) {
+        Eigen::VectorXd of(along.size() + stretches);
+        Eigen::Index n = 0;
+        if (volume) of[n++] = e.volume / *control_.volume;
+        if (area) of[n++] = e.area / *control_.area;
+        if (distance) of[n++] = e.length / control_.distance;
+        return of;
+    };
+    const VectorField X = s.X;
     const double period = s.period;
     for (int k = 0;; ++k) {
         s.X = X + stretched(X, out.stretch) + out.displacement, s.period = (1 + out.stretch) * period;
         const CurvedMesh m = mesh(s);
-        const Extent lacks = lack(m);
+        const BeadNumbers beads = held_beads(m);
+        const Extent lacks = lack(m, s.time, beads);
         if (k == 0) out.lacking = lacks;
-        const Eigen::Vector2d missing(area ? lacks.area : 0, volume ? lacks.volume : 0);
-        const Eigen::Vector2d parts(area ? missing[0] / *control_.area : 0, volume ? missing[1] / *control_.volume : 0);
-        const double off = parts.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
+        const Eigen::VectorXd missing = kept_of(lacks);
+        const double off = missing.cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
         if (off <= kept || (k == most_corrections && off <= still_kept)) return out;
         if (k == most_corrections)
-            throw SolveError(
-                fmt::format("area and volume are not conserved: relative error {:.2g} after {} corrections", off,
-                            most_corrections));
-        const Extent a = extent_rate(space_, m, by_normal),
-                     b = stretches ? stretch_rate(space_, m) : extent_rate(space_, m, by_H);
-        Eigen::Vector2d x(0, 0);
-        if (area && volume) {
-            Eigen::Matrix2d J;
-            J << a.area, b.area, a.volume, b.volume;
-            x = J.inverse() * missing;
-        } else if (volume) {
-            x[0] = missing[1] / a.volume;
-        } else {
-            x[1] = missing[0] / b.area;
-        }
-        out.displacement += x[0] * by_normal;
-        if (stretches)
-            out.stretch += x[1];
-        else
-            out.displacement += x[1] * by_H;
+            throw SolveError(fmt::format("{} are not conserved: relative error {:.2g} after {} corrections",
+                                         distance ? "area, volume and the distance of beads" : "area and volume", off,
+                                         most_corrections));
+        Eigen::MatrixXd J(missing.size(), missing.size());
+        for (std::size_t i = 0; i < along.size(); ++i) J.col(i) = kept_of(rate_of(m, beads, along[i]));
+        if (stretches) J.rightCols(1) = kept_of(stretch_rate(space_, m));
+        const Eigen::VectorXd x = solve_dense(J, missing);
+        for (std::size_t i = 0; i < along.size(); ++i) out.displacement += x[i] * along[i];
+        if (stretches) out.stretch += x[x.size() - 1];
     }
 }
 

@@ -13,9 +13,10 @@ namespace {
 constexpr double curvature_stabilisation = 0.08;
 constexpr double flux_tolerance = 1e-7;  // how well the mesh follows the surface, relative
 constexpr int most_carried = 20;         // of that, before it is factored
-constexpr int most_multipliers = 5;      // lambda or P, tension, supply, stretch, mu
+constexpr int most_multipliers = 10;     // lambda or P, tension, supply, stretch, mu, five of beads
 // Measured: docs/decisions/energies.md.
 constexpr double least_evenness = 0.02;
+constexpr int numbers_of_beads = 4;
 
 }  // namespace
 
@@ -40,6 +41,10 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
                   .tension = law.keeps_area ? stage.tension : law.tension.at(stage.time),
                   .stretch = stretch};
     if (surface_.bending().alpha) base.M = integral(surface_.space(), at, base.fields.H);
+    if (law.beads) {
+        base.beads = &*surface_.beads(), base.bead_numbers = surface_.bead_numbers(at);
+        base.force = law.holds_distance() ? stage.force : law.force.at(stage.time);
+    }
     StageSolution out;
     out.keeps_volume = law.keeps_volume && !surface_.area_is_volume(at, base.fields);
     const Eigen::VectorXd x = solve(base, stage.time, rate, out);
@@ -131,10 +136,25 @@ void StepSolver::make_symmetric(const StepBase& base) {
     if (surface_.law().free_period) scale_vector(system_.stretch.column);
 }
 
-// With the given rates of area and volume, where they are kept, and the loads of this time. Columns of the border, each
-// also a row: rigid motions; lambda; the tension of an area that is kept as a whole; the supply of a reservoir, whose
-// row is the mean of p; the stretch of a free period; how far alpha (M - M0) and P(V) at the end differ from those of
-// X*.
+namespace {
+
+// With room for `most` columns, of which these are the first.
+BorderedSolver::Border border_of(Eigen::Index unknowns, Eigen::Index most, const Eigen::MatrixXd& first) {
+    BorderedSolver::Border out{Eigen::MatrixXd::Zero(unknowns, most),
+                               {},
+                               Eigen::MatrixXd::Zero(most, most),
+                               Eigen::VectorXd::Zero(most)};
+    out.C.topLeftCorner(first.rows(), first.cols()) = first;
+    out.R = out.C;
+    return out;
+}
+
+}  // namespace
+
+// With the given rates of area, volume and distance, where they are kept, and the loads of this time. Columns of the
+// border, each also a row: rigid motions; lambda; the tension of an area that is kept as a whole; what belongs to
+// beads; the supply of a reservoir, whose row is the mean of p; the stretch of a free period; how far alpha (M - M0)
+// and P(V) at the end differ from those of X*.
 Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Extent& rate, StageSolution& out) {
     const SurfaceLaw& law = surface_.law();
     const MotionControl& control = surface_.control();
@@ -145,15 +165,11 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     const Loads given = loads_at(law, time);
     const double volume = given.of_volume ? extent(surface_.space(), *base.mesh).volume : 0;
     system_.b += given.pressure_at(volume) * system_.flux;
+    if (base.beads) system_.b += base.force * system_.pulling(base.bead_numbers);
     make_symmetric(base);
     const Eigen::MatrixXd rigid = surface_.open_rigid_motions(*base.mesh);
     const Eigen::Index most = rigid.cols() + most_multipliers;
-    BorderedSolver::Border border{Eigen::MatrixXd::Zero(unknowns_.size(), most),
-                                  {},
-                                  Eigen::MatrixXd::Zero(most, most),
-                                  Eigen::VectorXd::Zero(most)};
-    border.C.topLeftCorner(rigid.rows(), rigid.cols()) = rigid;
-    border.R = border.C;
+    BorderedSolver::Border border = border_of(unknowns_.size(), most, rigid);
     Eigen::Index n = rigid.cols();
     const auto add = [&](const Eigen::VectorXd& column, const Eigen::VectorXd& row, double value) {
         border.C.col(n) = column, border.R.col(n) = row, border.d[n] = value;
@@ -162,6 +178,8 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     const auto add_both = [&](const Eigen::VectorXd& column, double value) { return add(column, column, value); };
     const Eigen::Index lambda = out.keeps_volume ? add_both(system_.flux, control.volume ? rate.volume : 0) : -1;
     const Eigen::Index tension = law.keeps_area ? add_both(system_.widening, control.area ? rate.area : 0) : -1;
+    const Eigen::Index force = n + numbers_of_beads;
+    if (base.beads) add_beads(base, rate, border, n);
     if (law.reservoir) add_both(system_.pressure_load, -law.tension.at(time) * system_.pressure_load.sum());
     Eigen::Index stretch = -1;
     if (law.free_period) {
@@ -190,6 +208,7 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     const bool by_lu = solver_.fallbacks() > before;
     ++work.solves, work.lu += by_lu, work.iterations += by_lu ? 0 : solver_.iterations();
     if (lambda >= 0) out.lambda = y[lambda];
+    if (law.holds_distance()) out.force = base.force + y[force];
     if (stretch >= 0) out.stretch = y[stretch];
     if (tension >= 0) out.tension = y[tension];
     if (unknowns_.p >= 0) out.p = x.tail(unknowns_.size() - unknowns_.p);
@@ -224,6 +243,29 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
+// How the positions P and multipliers q of beads, theory.md (2.23), follow the surface from X*, to first order. Nothing
+// of this may be explicit: where a viscous membrane is flat, it does not resist motion along its normal. Columns: of
+// each bead P and q, then the force that holds the distance beyond the expected one.
+void StepSolver::add_beads(const StepBase& base, const Extent& rate, BorderedSolver::Border& border,
+                           Eigen::Index& n) const {
+    const Eigen::Index first = n, force = n + numbers_of_beads;
+    for (int k = 0; k < 2; ++k) {
+        const Eigen::Index P = n, q = n + 1;
+        const Eigen::VectorXd of_G = system_.beads.col(2 * k), of_slope = system_.beads.col(2 * k + 1);
+        const double unit = base.bead_numbers[2 * k + 1], pulls = base.force * unit;  // 1/(dG/dP), and q
+        border.C.col(P) = pulls * of_slope, border.C.col(q) = of_G;
+        border.D(P, P) = pulls * surface_.bead_bend(*base.mesh, k, base.bead_numbers[2 * k]) / base.te;
+        border.D(P, q) = border.D(q, P) = 1 / unit / base.te;
+        border.d[P] = pulls * lead(base, of_slope, 0) / base.te, border.d[q] = lead(base, of_G, 0) / base.te;
+        n += 2;
+    }
+    border.R.middleCols(first, numbers_of_beads) = border.C.middleCols(first, numbers_of_beads);
+    if (!surface_.law().holds_distance()) return;
+    for (const Eigen::Index P : {first, first + 2}) border.D(P, force) = border.D(force, P) = -1 / base.te;
+    border.d[force] = lead(base, system_.pulling(base.bead_numbers), 0) / base.te - rate.length;
+    ++n;
+}
+
 // A number of X*, given by its slope, less that to which the expected motion of the nodes and none of the surface would
 // lead.
 double StepSolver::lead(const StepBase& base, const Eigen::VectorXd& slope, double by_stretch) const {
@@ -247,7 +289,9 @@ double StepSolver::work(const MovingSurface::Correction& by, const MotionState& 
     const SurfaceLaw& law = surface_.law();
     const CurvedMesh mesh = surface_.mesh(at);
     const double volume = law.pressure_of_volume ? extent(space, mesh).volume : 0;
-    double sum = law.potential_rate(at.time, extent_rate(space, mesh, by.displacement), volume);
+    Extent moved = extent_rate(space, mesh, by.displacement);
+    if (law.beads) moved.length = surface_.distance_rate(mesh, surface_.bead_numbers(mesh), by.displacement);
+    double sum = law.potential_rate(at.time, moved, volume);
     if (by.stretch != 0) {
         const StretchTerms& s = system_.stretch;
         double energy = s.energy + law.potential_rate(at.time, s.rate, volume);

@@ -29,10 +29,7 @@ struct SurfaceLaw : MotionLaw {
         const Loads loads = loads_at(*this, time);
         return loads.tension * rate.area - loads.pressure_at(volume) * rate.volume - loads.force * rate.length;
     }
-    // The first time after this at which a load changes its slope, infinite if there is none.
-    double next_kink(double time) const {
-        return std::min({tension.next_kink(time), pressure.next_kink(time), force.next_kink(time)});
-    }
+    bool holds_distance() const { return beads && beads->extension; }
 };
 
 }  // namespace tubule::surface3d

@@ -27,35 +27,21 @@ struct Task {
     BranchSettings branch;
 };
 
-// With edges of twice the shortest range of a wall, or width of beads, at most: of order 4 their nodes are half of it
-// apart.
-int triangles_for(const Problem& c, double area) {
-    double shortest = c.law.beads ? c.law.beads->width : HUGE_VAL;
-    for (const Potential& p : c.energy.potentials)
-        if (p.is_wall()) shortest = std::min(shortest, p.range);
-    const double out = area / (std::sqrt(3.0) * shortest * shortest);
-    return static_cast<int>(std::min(out, 1e6));
-}
-
 Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
     const EnergyValues v = DiscreteEnergy(mesh, c.energy).values(mesh, c.energy);
     require_pressure(c, v.volume);
-    double distance = HUGE_VAL;  // to a wall
-    for (const Potential& p : c.energy.potentials)
-        for (const Eigen::Vector3d& x : mesh.nodes)
-            if (p.is_wall()) distance = std::min(distance, p.distance(std::hypot(x[0], x[1]), x[2]));
-    require_place(c, mesh.period == 0, v.potential, distance);
+    require_place(c, mesh.period == 0, v.potential, wall_distance(mesh, c.energy.potentials).value);
     Task task{stationary_problem(c, v.area, v.volume), {}, {}, {}};
     check_problem(c, task.problem, mesh.period);
     if (c.law.beads) {
-        task.problem.bead_distance = bead_distance(mesh, c.energy, c.law.beads->width);
+        task.problem.bead_distance = bead_distance(mesh, c.law.beads->width);
         require_beads(c, mesh.period == 0, task.problem.bead_distance);
     }
     SurfaceEquilibriumSettings& s = task.settings;
     s.accuracy = c.accuracy.energy;
     s.descend = c.equilibrium->descend;
-    s.first_triangles = std::max(s.first_triangles, triangles_for(c, v.area));
+    s.first_triangles = std::max(s.first_triangles, triangles_for_places(c.energy.potentials, c.law.beads, v.area));
     s.near = std::holds_alternative<ResultFrame>(c.shape);
     s.modes = c.equilibrium->rates.value_or(1);
     if (!start.resizable())

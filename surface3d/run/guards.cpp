@@ -89,6 +89,10 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
                           "resolve the curvature"};
     if (m.domain.is_small()) return undefined_energy(m, time);
     if (m.pressure_domain.is_small()) return undefined_pressure(m.pressure_domain, time);
+    if (!(m.wall.value > 0))
+        return StopReport{
+            Stop::undefined, time, "the membrane is behind the wall of a potential at " + where(m.wall.where),
+            "place the initial shape in front of the wall, or choose law = \"9-3\", which nothing passes"};
     if (!(m.neck_radius >= r_min))
         return StopReport{Stop::pinch_off, time,
                           fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
@@ -100,6 +104,17 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
                                       m.quality.worst),
                           "use more elements or a shorter discretisation.relaxation"};
     return std::nullopt;
+}
+
+std::optional<StopReport> find_coarse_place(const MotionMeasures& m, double most, double time) {
+    const bool at_wall = m.coarse_wall.value >= m.coarse_bead.value;
+    const Coarseness& coarse = at_wall ? m.coarse_wall : m.coarse_bead;
+    if (!(coarse.value > most)) return std::nullopt;
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("near {} nodes are {:.2g} times {} apart, and may be {:.2g} times", where(coarse.where),
+                    coarse.value, at_wall ? "the range of the wall there" : "model.bead_width", most),
+        at_wall ? "use more elements; a longer range needs fewer" : "use more elements; wider beads need fewer"};
 }
 
 std::optional<StopReport> find_rise_in_step(double rise, double asked, double time, double step) {

@@ -33,9 +33,12 @@ StopReport undefined_energy(const MotionMeasures& m, double time);
 double least_neck(const Problem& c, double area);
 
 // Faults of the shape and its triangles, which no shorter step would remedy: an energy that does not resist short
-// waves or is hardly defined, a neck thinner than r_min, normals that turn too far from node to node, a degenerate
-// triangle.
+// waves or is hardly defined, a wall that is passed, a neck thinner than r_min, normals that turn too far from node to
+// node, a degenerate triangle.
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time);
+
+// Triangles that do not resolve a wall or a bead: a coarseness above `most`.
+std::optional<StopReport> find_coarse_place(const MotionMeasures& m, double most, double time);
 
 // The energy, kinetic energy included, can only fall. A step that raises it by more than a quarter of the accuracy
 // asked is refused; many small rises stop a run once they come to ten times that accuracy. All relative to E_ref, the

@@ -13,7 +13,7 @@ void state_fields(Fields&& f, State& s) {
     const auto nodes = s.X.cols();
     f.number("restart_step", s.step), f.number("restart_lambda", s.lambda);
     f.number("restart_tension", s.tension), f.number("restart_period", s.period);
-    f.number("restart_stretch", s.stretch);
+    f.number("restart_stretch", s.stretch), f.optional_number("restart_force", s.force);
     f.array("restart_w", s.w, nodes), f.array("restart_u", s.u), f.optional_array("restart_p", s.p);
 }
 template <class Fields, class Memory>
@@ -30,6 +30,8 @@ void memory_fields(Fields&& f, Memory& m) {
     f.number("restart_work", m.balance.work), f.number("restart_supplied", m.balance.supplied),
         f.number("restart_area_past", m.balance.past.area);
     f.number("restart_volume_past", m.balance.past.volume), f.number("restart_length_past", m.balance.past.length);
+    f.optional_number("restart_force_past", m.balance.force_past);
+    f.optional_number("restart_bead_distance", m.scale.bead_distance);
     f.number("restart_corrected", m.balance.corrected), f.number("restart_error", m.error);
     f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.defect);
     f.number("restart_dissipation_past", m.balance.dissipation_past), f.number("restart_moved", m.moved);
@@ -88,7 +90,8 @@ MotionRestart motion_restart(const Record& record, Scheme scheme) {
     return out;
 }
 
-SeriesTable<MotionRow> motion_series(const Bending& energy) {
+SeriesTable<MotionRow> motion_series(const Problem& c) {
+    const Bending& energy = c.energy;
     SeriesTable<MotionRow> table;
     table.add({
         {"time", [](const MotionRow& r) { return r.state.time; }},
@@ -100,6 +103,8 @@ SeriesTable<MotionRow> motion_series(const Bending& energy) {
     if (energy.alpha)
         table.add({{"energy_alpha", [](const MotionRow& r) { return r.measures.bending.energy_alpha; }},
                    {"M", [](const MotionRow& r) { return r.measures.bending.M; }}});
+    if (!energy.potentials.empty())
+        table.add({{"potential_energy", [](const MotionRow& r) { return r.measures.bending.potential; }}});
     table.add({
         {"free_energy", [](const MotionRow& r) { return r.measures.free_energy; }},
         {"work", [](const MotionRow& r) { return r.work; }},
@@ -123,6 +128,11 @@ SeriesTable<MotionRow> motion_series(const Bending& energy) {
         {"tension", [](const MotionRow& r) { return r.measures.tension; }},
         {"pressure", [](const MotionRow& r) { return r.measures.pressure; }},
         {"force", [](const MotionRow& r) { return r.measures.force; }},
+    });
+    if (!energy.potentials.empty())
+        table.add({{"potential_force", [](const MotionRow& r) { return r.measures.bending.potential_force; }}});
+    if (c.law.beads) table.add({{"bead_distance", [](const MotionRow& r) { return r.measures.length; }}});
+    table.add({
         {"stretching", [](const MotionRow& r) { return r.measures.stretching; }},
         {"correction_energy", [](const MotionRow& r) { return r.correction_energy; }},
         {"integral_H2", [](const MotionRow& r) { return r.measures.bending.integral_H2; }},

@@ -17,6 +17,7 @@ struct MotionScale {
     double relaxation = 0;       // the time in which the mesh relaxes
     double least_variation = 0;  // of H, see MotionControl
     double reference_energy = 0;
+    double bead_distance = 0;
 
     double length() const { return std::sqrt(area); }
 };
@@ -26,7 +27,8 @@ struct MotionBalance {
     double total_start = 0, lowest_total = 0;  // initially, and least so far
     double work = 0;                           // of the loads: dF at constant area and volume
     double supplied = 0;                       // kinetic energy, by a reservoir
-    Extent past;                               // area, volume and period at the step before
+    Extent past;                               // area, volume and length at the step before
+    double force_past = 0;                     // and the force that held the distance of beads
     double dissipated = 0, corrected = 0;
     double dissipation_past = 0;  // its rate at the step before
     double defect = 0;            // largest defect of the dissipation identity
@@ -81,6 +83,6 @@ struct MotionRow {
     double wall_seconds;
 };
 
-SeriesTable<MotionRow> motion_series(const Bending& energy);
+SeriesTable<MotionRow> motion_series(const Problem& c);
 
 }  // namespace tubule::surface3d

@@ -7,6 +7,7 @@
 
 #include "common/case/read.hpp"
 #include "common/run/energy_checks.hpp"
+#include "surface3d/fem/places.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -25,8 +26,8 @@ double time_to_change(const MotionLaw& law, const Observables& o, bool closed, d
 }
 
 // theory.md (11.1)
-double own_scale(const Problem& c, const Observables& o, double period) {
-    return std::max(std::abs(free_energy(c, o, period)), o.magnitude + load_scale(c.law, o.area, o.volume, period));
+double own_scale(const Problem& c, const Observables& o, double length) {
+    return std::max(std::abs(free_energy(c, o, length)), o.magnitude + load_scale(c.law, o.area, o.volume, length));
 }
 
 }  // namespace
@@ -47,24 +48,28 @@ Observables observe_start(const Problem& c, const StartMesh& start) {
     return observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, start_H0(c, start));
 }
 
-double free_energy(const Problem& c, const Observables& o, double period) {
-    return o.energy + SurfaceLaw(c.law).potential(c.begin_time, {o.area, o.volume, period});
+double start_length(const Problem& c, const CurvedMesh& mesh) {
+    return c.law.beads ? bead_distance(mesh, c.law.beads->width) : mesh.period;
+}
+
+double free_energy(const Problem& c, const Observables& o, double length) {
+    return o.energy + SurfaceLaw(c.law).potential(c.begin_time, {o.area, o.volume, length});
 }
 
 double error_of_start(const Problem& c, const Start& start, int elements, double energy) {
     if (!start.resizable()) return 0;
     try {
         const StartMesh finer = start.mesh(static_cast<int>(much_finer * elements), c.element_order);
-        const double change = free_energy(c, observe_start(c, finer), finer.mesh.period) - energy;
+        const double change = free_energy(c, observe_start(c, finer), start_length(c, finer.mesh)) - energy;
         return std::abs(change) * much_finer / (much_finer - 1);
     } catch (const SolveError&) {
         return 0;
     }
 }
 
-double reference_energy(const Problem& c, const Observables& o, double period) {
+double reference_energy(const Problem& c, const Observables& o, double length) {
     if (c.handover) return c.handover->reference_energy;
-    return tubule::reference_energy(c, free_energy(c, o, period), own_scale(c, o, period));
+    return tubule::reference_energy(c, free_energy(c, o, length), own_scale(c, o, length));
 }
 
 Eigen::VectorXd start_H0(const Problem& c, const StartMesh& start) {
@@ -110,11 +115,19 @@ void remember_start(const Problem& c, const StartMesh& start, const SurfaceSpace
     const Observables o = observe(space, start.mesh, {fields.normal, {}, fields.H, fields.K}, c.energy, memory.H0);
     require_defined(c, start.mesh, fields.H, fields.K, memory.H0);
     require_pressure(c, o.volume);
+    const bool closed = start.mesh.period == 0;
+    require_place(c, closed, o.potential, wall_distance(start.mesh, c.energy.potentials).value);
+    const double length = start_length(c, start.mesh);
+    if (c.law.beads) {
+        require_beads(c, closed, length);
+        memory.scale.bead_distance = length;
+        if (c.law.beads->extension) memory.scale.bead_distance -= c.law.beads->extension->at(c.begin_time);
+    }
     memory.scale.area = o.area, memory.scale.volume = o.volume;
     memory.balance.work = c.handover ? c.handover->work : 0;
-    memory.scale.reference_energy = reference_energy(c, o, start.mesh.period);
+    memory.scale.reference_energy = reference_energy(c, o, length);
     memory.scale.relaxation = c.surface.relaxation.value_or(
-        relaxes_in * time_to_change(c.law, o, start.mesh.period == 0, own_scale(c, o, start.mesh.period)));
+        relaxes_in * time_to_change(c.law, o, start.mesh.period == 0, own_scale(c, o, length)));
     memory.scale.least_variation = std::max(same_everywhere, times_noise * noise_of_H(space, start.mesh, fields));
 }
 

@@ -13,11 +13,13 @@ VectorField start_velocity(const Problem& c, const StartMesh& start);
 Observables observe_start(const Problem& c, const StartMesh& start);
 
 // The initial F, and E_ref of a run with it. The latter throws CaseError as tubule::reference_energy.
-double free_energy(const Problem& c, const Observables& start, double period);
+// `length`: the period, or the distance of beads, NaN where a bead has no position.
+double start_length(const Problem& c, const CurvedMesh& mesh);
+double free_energy(const Problem& c, const Observables& start, double length);
 // Absolute error of this initial energy on a mesh of this number of elements, by a finer mesh, since where the shape is
 // not smooth a coarser one may be off by the same. 0 where there is none.
 double error_of_start(const Problem& c, const Start& start, int elements, double energy);
-double reference_energy(const Problem& c, const Observables& start, double period);
+double reference_energy(const Problem& c, const Observables& start, double length);
 
 // The spontaneous curvature at the nodes, where it varies; else nothing. Throws CaseError where a formula is no number,
 // or not the same at both ends of a period.

@@ -270,7 +270,7 @@ Record frame(const Problem& c, const Measured& m, std::size_t mesh_number) {
 }  // namespace
 
 std::vector<std::string> series_names(const Problem& c) {
-    if (c.moves()) return motion_series(c.energy).names();
+    if (c.moves()) return motion_series(c).names();
     return rest_series(c).names();
 }
 

@@ -29,6 +29,7 @@ constexpr double shortest_step = 1e-9;         // of the relaxation time: shorte
 // Nodes of the coarser run of a pair are farther apart, and normals turn more, by this factor.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
+constexpr double finer_at = 0.9;  // of the coarsest mesh at walls and beads
 // Errors of a coarser run over those of the run: with 2.25 times fewer triangles of order 4.
 constexpr double larger_errors = 5;
 // Coarser meshes once the motion is smooth: steps from try to try, most of them; the largest jump of the energy over
@@ -63,6 +64,7 @@ double SurfaceSimulation::begin_time() const {
 void SurfaceSimulation::use_mesh(const CurvedMesh& mesh) {
     const MotionControl control{.area = memory_.scale.area,
                                 .volume = memory_.scale.volume,
+                                .distance = memory_.scale.bead_distance,
                                 .relaxation = memory_.scale.relaxation,
                                 .follow_curvature = case_.surface.follow_curvature,
                                 .least_variation = memory_.scale.least_variation,
@@ -86,8 +88,8 @@ void SurfaceSimulation::begin(const Start& from) {
         case_.surface.step.value_or(std::min(first_step * memory_.scale.relaxation, case_.time.end - begin_time()));
     use_mesh(start.mesh);
     const VectorField u = start_velocity(case_, start);
-    state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped()) : surface().start(start.mesh);
-    state_.time = begin_time();
+    state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped(), {}, begin_time())
+                          : surface().start(start.mesh, begin_time());
     if (surface().law().inertia == 0 && traits().controls_steps) set_moving();
     measure_state();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
@@ -103,7 +105,8 @@ void SurfaceSimulation::set_moving() {
         const MotionState soon = scheme_->step(state_, moment * memory_.next_step).state;
         if (!is_finite(soon)) return;
         state_.u = soon.u, state_.w = soon.w;
-        state_.p = soon.p, state_.lambda = soon.lambda, state_.tension = soon.tension, state_.stretch = soon.stretch;
+        state_.p = soon.p, state_.lambda = soon.lambda, state_.tension = soon.tension, state_.force = soon.force;
+        state_.stretch = soon.stretch;
     } catch (const SolveError&) {
     }
 }
@@ -207,15 +210,17 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::try_step(double tau
 // Length of the step before; 0 where a load changed its slope at its end: rates have a kink there.
 double SurfaceSimulation::since_kink() const {
     const double before = std::nextafter(state_.time, -HUGE_VAL);
-    return surface().law().next_kink(before) == state_.time ? 0 : state_.step;
+    return tubule::next_kink(surface().law(), before) == state_.time ? 0 : state_.step;
 }
 
-// Work of the loads in a step, in which none changes its slope.
+// Work of the loads in a step, in which none changes its slope, and of what draws beads apart.
 double SurfaceSimulation::work_of(const MotionStep& next, const MotionMeasures& m) const {
-    const auto power = [&](const Extent& e) { return surface().law().power(state_.time, e); };
+    const SurfaceLaw& law = surface().law();
+    const double extends = law.beads ? law.beads->rate(state_.time) : 0;
+    const auto power = [&](const Extent& e, double force) { return law.power(state_.time, e) + force * extends; };
     return integral_over_step(next.state.step, state_.step,
-                              power({m.bending.area, m.bending.volume, next.state.period}), power(extent_now()),
-                              power(memory_.balance.past));
+                              power({m.bending.area, m.bending.volume, m.length}, m.force),
+                              power(extent_now(), now_.force), power(memory_.balance.past, memory_.balance.force_past));
 }
 
 // Kinetic energy that a reservoir brings in a step: the mean of it per area, times the new area. Exact where a surface
@@ -229,7 +234,7 @@ double SurfaceSimulation::supplied_by(const MotionMeasures& m) const {
 void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.work += work_of(next, m);
     memory_.balance.supplied += supplied_by(m);
-    memory_.balance.past = extent_now();
+    memory_.balance.past = extent_now(), memory_.balance.force_past = now_.force;
     memory_.balance.dissipated += integral_over_step(next.state.step, since_kink(), m.dissipation, now_.dissipation,
                                                      memory_.balance.dissipation_past);
     memory_.balance.dissipation_past = now_.dissipation;
@@ -253,16 +258,23 @@ void SurfaceSimulation::choose_next_step(double tau, double asked, double error,
 bool SurfaceSimulation::wants_new_mesh() const {
     if (!traits().controls_mesh || memory_.count.steps < memory_.count.mesh_since + steps_between_meshes) return false;
     const double most = turn_to_remesh * (is_reported() ? 1 : farther_apart);
-    return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > most);
+    return now_.quality.worst < quality_to_remesh || (now_.turn.saddle && now_.turn.angle > most) || is_coarse();
 }
 
 // The same surface with good triangles, and small ones where it is sharp; the next step is again the first of its kind.
 // Where no better mesh can be made, the old one is kept: check_state() stops the run when it is no longer good enough.
 void SurfaceSimulation::make_new_mesh() {
     memory_.count.mesh_since = memory_.count.steps;
-    const auto found = remesh(surface().mesh(state_), carried(), {});
+    const CurvedMesh now = surface().mesh(state_);
+    const auto& beads = surface().law().beads;
+    RemeshOptions options;
+    if (beads || !case_.energy.potentials.empty())
+        options.largest = largest_edges(now, case_.energy.potentials, beads,
+                                        beads ? surface().bead_numbers(now) : BeadNumbers::Zero().eval()) *
+                          (is_reported() ? 1 : farther_apart);
+    const auto found = remesh(now, carried(), options);
     const auto* better = std::get_if<Remeshed>(&found);
-    if (!better || better->quality.worst < now_.quality.worst) return;
+    if (!better || (better->quality.worst < now_.quality.worst && !is_coarse())) return;
     if (!change_mesh(better->mesh, better->fields, HUGE_VAL)) return;
     memory_.grid = 0;
     if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.scale.relaxation);
@@ -341,8 +353,8 @@ bool SurfaceSimulation::change_mesh(const CurvedMesh& mesh, const Eigen::MatrixX
     try {
         if (old_H0.size() > 0) memory_.H0 = fields.row(d).transpose();
         use_mesh(mesh);
-        state_ = surface().start(mesh, fields.topRows(d).transpose().reshaped(), momenta);
-        state_.time = old_state.time, state_.stretch = old_state.stretch;
+        state_ = surface().start(mesh, fields.topRows(d).transpose().reshaped(), momenta, old_state.time);
+        state_.stretch = old_state.stretch, state_.force = old_state.force;
         measure_state();
     } catch (const SolveError&) {
         keep_old();
@@ -399,10 +411,20 @@ StopReport SurfaceSimulation::failure(const SolveError& error) {
             "try another discretisation.elements or discretisation.order"};
 }
 
+// At walls and beads.
+double SurfaceSimulation::most_coarse() const {
+    return coarsest_place * (is_reported() ? 1 : farther_apart);
+}
+
+bool SurfaceSimulation::is_coarse() const {
+    return std::max(now_.coarse_wall.value, now_.coarse_bead.value) > finer_at * most_coarse();
+}
+
 // Why the surface or its energy is not valid.
 std::optional<StopReport> SurfaceSimulation::check_state() const {
     const double t = state_.time, asked = case_.accuracy.energy;
     if (auto bad = find_bad_shape(now_, least_neck(case_, memory_.scale.area), t)) return bad;
+    if (auto coarse = find_coarse_place(now_, most_coarse(), t)) return coarse;
     if (traits().controls_mesh)
         if (auto drift = find_drift(volume_drift(), asked, t)) return drift;
     return std::nullopt;
@@ -458,7 +480,7 @@ public:
 
     std::vector<double> row(double wall_seconds) const override {
         const MotionBalance& balance = run_.memory_.balance;
-        return motion_series(run_.case_.energy)
+        return motion_series(run_.case_)
             .values({run_.state_, run_.now_, balance.done(), run_.volume_drift(), balance.defect_at(run_.total()),
                      balance.corrected, run_.error_now_, run_.summary.elements, wall_seconds});
     }

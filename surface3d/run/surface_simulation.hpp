@@ -98,6 +98,8 @@ private:
 
     std::optional<StopReport> check_state() const;
     std::optional<StopReport> check_crossing(bool at_output);
+    double most_coarse() const;
+    bool is_coarse() const;
     double volume_drift() const;
     void warn_of_drift();
 
@@ -105,10 +107,10 @@ private:
     MovingSurface& surface() const { return scheme_->surface(); }
     // What can only fall, and the part of it that runs are compared by: without the kinetic energy.
     double total() const { return comparable() + now_.kinetic - memory_.balance.supplied; }
-    Extent extent_now() const { return {now_.bending.area, now_.bending.volume, state_.period}; }
+    Extent extent_now() const { return {now_.bending.area, now_.bending.volume, now_.length}; }
     double comparable() const { return now_.free_energy - memory_.balance.work; }
     double moment_of_time() const { return 1e-12 * case_.time.end; }
-    double next_kink() const { return surface().law().next_kink(state_.time + moment_of_time()); }
+    double next_kink() const { return tubule::next_kink(surface().law(), state_.time + moment_of_time()); }
 
     const Problem& case_;
     RunObserver& watch_;

@@ -214,8 +214,6 @@ TEST(Potential, wallsAreNotPassed) {
         return test::message_of<CaseError>([&] { parse_case(at_wall, sets, "case.toml"); });
     };
     EXPECT_NE(refusal({"energy.potential.0.range=0"}).find("must be a number > 0"), std::string::npos);
-    EXPECT_NE(refusal({"tier=surface3d"}).find("only valid with tier = \"axisym\", or"), std::string::npos)
-        << refusal({"tier=surface3d"});
 }
 
 }  // namespace potential_test

@@ -14,7 +14,7 @@ constexpr double miss_relaxation = 0.5;  // of the expected defect of area and v
 struct Multipliers {
     double time = 0;
     Eigen::VectorXd p;
-    double lambda = 0, tension = 0;
+    double lambda = 0, tension = 0, force = 0;
 };
 
 struct AlphaMemory : ListedMemory<AlphaMemory> {
@@ -37,6 +37,7 @@ struct AlphaMemory : ListedMemory<AlphaMemory> {
         f.optional_array("restart_solved_p", own.solved.p, state.p.size());
         f.number("restart_solved_lambda", own.solved.lambda);
         f.number("restart_solved_tension", own.solved.tension);
+        f.optional_number("restart_solved_force", own.solved.force);
         f.number("restart_missed_area", own.missed.area);
         f.number("restart_missed_volume", own.missed.volume);
     }
@@ -60,7 +61,7 @@ private:
         next->X_rate = (solved.X - stage.Xbar) / stage.te;
         next->u_rate = (solved.u - stage.ubar) / stage.te;
         next->period_rate = (solved.period - stage.period_bar) / stage.te;
-        next->solved = {from.time + tau, solved.p, solved.lambda, solved.tension};
+        next->solved = {from.time + tau, solved.p, solved.lambda, solved.tension, solved.force};
         MotionStep out = finish(from, nullptr, stage, solved, end_of(from, solved, stage, tau)).step;
         out.state.memory = std::move(next);
         return out;
@@ -87,12 +88,13 @@ private:
         next->u_rate = renewed(memory.u_rate, solved.u, stage.ubar);
         next->period_rate = renewed(memory.period_rate, solved.period, stage.period_bar);
         next->lag = a.lag;
-        next->solved = {from.time + stage.level * tau, solved.p, solved.lambda, solved.tension};
+        next->solved = {from.time + stage.level * tau, solved.p, solved.lambda, solved.tension, solved.force};
         MotionState to = end_of(from, solved, stage, tau);
         if (stage.level < 1) {  // from there to the end, linearly
             const double ahead = (to.time - next->solved.time) / (next->solved.time - memory.solved.time);
             to.lambda += ahead * (to.lambda - memory.solved.lambda);
             to.tension += ahead * (to.tension - memory.solved.tension);
+            to.force += ahead * (to.force - memory.solved.force);
             if (to.p.size() > 0) to.p += ahead * (to.p - memory.solved.p);
         }
         Finished done = finish(from, &memory.past, stage, solved, std::move(to));

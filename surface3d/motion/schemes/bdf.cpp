@@ -131,6 +131,7 @@ public:
                                  .p = solved.p,
                                  .lambda = solved.lambda,
                                  .tension = solved.tension,
+                                 .force = solved.force,
                                  .period = solved.period,
                                  .stretch = solved.stretch,
                                  .memory = {}},
@@ -158,16 +159,17 @@ private:
                     past.ahead(past.stretch, through),
                     past.ahead(past.u, through),
                     from.tension,
+                    from.force,
                     std::max(surface().control().relaxation, least_relaxation * past.te(order))};
         MovingSurface& s = surface();
         const auto rate = [&] {
             const CurvedMesh at = s.mesh(stage.X, stage.period);
-            return s.rate_to_keep(at, s.mesh(stage.Xbar, stage.period_bar), at, stage.te, {});
+            return s.rate_to_keep(at, s.mesh(stage.Xbar, stage.period_bar), at, stage.time, stage.te, {});
         };
         StageSolution out = solver_.solve(stage, rate());
         if (order <= most_extrapolated) return out;
         stage.X = out.X, stage.w = out.w, stage.u = out.u;
-        stage.period = out.period, stage.stretch = out.stretch;
+        stage.period = out.period, stage.stretch = out.stretch, stage.force = out.force;
         return solver_.solve(stage, rate());
     }
 

@@ -51,13 +51,14 @@ StageSolution OneStageScheme::solve(const MotionState& from, const PastState* pa
                          ahead(stage.level, from.stretch, before.stretch),
                          ahead(stage.level, from.u, before.u),
                          from.tension,
+                         from.force,
                          surface().control().relaxation + stage.te};
     MovingSurface& s = surface();
     const CurvedMesh begin = s.mesh(from.X + (stage.Xbar - from.X) / stage.level,
                                     from.period + (stage.period_bar - from.period) / stage.level);
     const CurvedMesh end = s.mesh(ahead(1, from.X, before.X), ahead(1, from.period, before.period));
-    return solver_.solve(
-        expected, s.rate_to_keep(s.mesh(expected.X, expected.period), begin, end, stage.te / stage.level, missed));
+    return solver_.solve(expected, s.rate_to_keep(s.mesh(expected.X, expected.period), begin, end, from.time + tau,
+                                                  stage.te / stage.level, missed));
 }
 
 MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution& solved, const OneStage& stage,
@@ -70,6 +71,7 @@ MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution&
                    .p = solved.p,
                    .lambda = solved.lambda,
                    .tension = solved.tension,
+                   .force = solved.force,
                    .period = solved.period,
                    .stretch = solved.stretch,
                    .memory = {}};
