@@ -18,6 +18,11 @@ constexpr int most_multipliers = 10;     // lambda or P, tension, supply, stretc
 constexpr double least_evenness = 0.02;
 constexpr int numbers_of_beads = 4;
 
+// In which they are as large as the rates of the surface: GMRES has one tolerance for all.
+double unit_of_beads(const StepBase& base) {
+    return std::sqrt(base.te);
+}
+
 }  // namespace
 
 StepSolver::StepSolver(MovingSurface& surface)
@@ -208,7 +213,7 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     const bool by_lu = solver_.fallbacks() > before;
     ++work.solves, work.lu += by_lu, work.iterations += by_lu ? 0 : solver_.iterations();
     if (lambda >= 0) out.lambda = y[lambda];
-    if (law.holds_distance()) out.force = base.force + y[force];
+    if (law.holds_distance()) out.force = base.force + unit_of_beads(base) * y[force];
     if (stretch >= 0) out.stretch = y[stretch];
     if (tension >= 0) out.tension = y[tension];
     if (unknowns_.p >= 0) out.p = x.tail(unknowns_.size() - unknowns_.p);
@@ -259,11 +264,15 @@ void StepSolver::add_beads(const StepBase& base, const Extent& rate, BorderedSol
         border.d[P] = pulls * lead(base, of_slope, 0) / base.te, border.d[q] = lead(base, of_G, 0) / base.te;
         n += 2;
     }
-    border.R.middleCols(first, numbers_of_beads) = border.C.middleCols(first, numbers_of_beads);
-    if (!surface_.law().holds_distance()) return;
-    for (const Eigen::Index P : {first, first + 2}) border.D(P, force) = border.D(force, P) = -1 / base.te;
-    border.d[force] = lead(base, system_.pulling(base.bead_numbers), 0) / base.te - rate.length;
-    ++n;
+    if (surface_.law().holds_distance()) {
+        for (const Eigen::Index P : {first, first + 2}) border.D(P, force) = border.D(force, P) = -1 / base.te;
+        border.d[force] = lead(base, system_.pulling(base.bead_numbers), 0) / base.te - rate.length;
+        ++n;
+    }
+    const Eigen::Index count = n - first;
+    border.C.middleCols(first, count) *= unit_of_beads(base), border.d.segment(first, count) *= unit_of_beads(base);
+    border.D.block(first, first, count, count) *= base.te;
+    border.R.middleCols(first, count) = border.C.middleCols(first, count);
 }
 
 // A number of X*, given by its slope, less that to which the expected motion of the nodes and none of the surface would

@@ -24,7 +24,7 @@ constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * ask
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
 constexpr double loosest_of_coarser = 2e-3;            // beyond it they leave waves that no mesh resolves
 constexpr double least_fewer = 1.1;
-constexpr double longest_over_mean = 1.6;                 // edges, squared: at walls and beads the longest counts
+constexpr double spare_at_places = 0.85;                  // of the coarsest mesh at walls and beads: the surface moves
 constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of H, linear between nodes, at kinks
 constexpr double stable_growth = 2.4, any_growth = 1e9;   // of steps; beyond the first bdf2 is unstable
 constexpr double spare_in_time = 1.25;                    // at most 1.1 of the error was seen to be missing
@@ -49,6 +49,16 @@ double order_in_space(const Problem& c, double smoothness) {
     return c.element_order < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
 }
 
+bool too_coarse_at_places(const Problem& c, const CurvedMesh& mesh) {
+    double coarse = wall_coarseness(mesh, c.energy.potentials).value;
+    if (c.law.beads) {
+        const BeadEquations beads(c.law.beads->width, BeadEquations::in_space);
+        coarse = std::max(
+            coarse, bead_coarseness(mesh, bead_numbers(SurfaceSpace(mesh), mesh, beads, 0), c.law.beads->width).value);
+    }
+    return coarse > spare_at_places * coarsest_place;
+}
+
 // The number of triangles from which on the initial energy is as accurate as asked, by a coarser mesh and by a
 // finer one: two of them may agree by chance.
 int triangles_for_start(const Problem& c, const Start& start) {
@@ -57,16 +67,16 @@ int triangles_for_start(const Problem& c, const Start& start) {
     for (int n = first_triangles;; n = static_cast<int>(growth_of_start * n)) {
         const StartMesh mesh = start.mesh(n, order), coarse = start.mesh(fewer_triangles(n), order);
         const Observables o = observe_start(c, mesh);
-        n = std::max(
-            n, static_cast<int>(longest_over_mean * triangles_for_places(c.energy.potentials, c.law.beads, o.area)));
         const double length = start_length(c, mesh.mesh);
         const double energy = free_energy(c, o, length),
                      before = free_energy(c, observe_start(c, coarse), start_length(c, coarse.mesh));
         other.coarser_by = std::max(1.0 * mesh.mesh.triangles() / coarse.mesh.triangles(), least_fewer);
         const double error = later * std::abs(energy - before) / (growth_in_space(other, smooth_order) - 1);
         const double asked = c.accuracy.energy * reference_energy(c, o, length);
-        const bool more = error > asked || error_of_start(c, start, n, energy) > asked;
-        if (!more || growth_of_start * n > most_first_triangles) return n;
+        const bool at_places = too_coarse_at_places(c, mesh.mesh) && growth_of_start * n < most_triangles;
+        const bool more = (error > asked || error_of_start(c, start, n, energy) > asked) &&
+                          growth_of_start * n < most_first_triangles;
+        if (!more && !at_places) return n;
     }
 }
 
