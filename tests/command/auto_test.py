@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from program import ProgramTest, about, series
+from program import ProgramTest, about, series, study
 
 CASE = Path(sys.argv[2], "auto_buckles.toml")
 RATE, LENGTH = 0.612294287659, 9.0
@@ -121,6 +121,7 @@ class Buckling(ProgramTest):
         self.tubule("run", self.case, "--resume", "--quiet")
         self.assert_ends_like_the_undisturbed_run()
 
+    @study
     def test_interrupted_in_its_second_part(self):
         self.disturbed(signal.SIGINT, 2)
         self.assertEqual(about(self.result)["stop"], "interrupted")

@@ -16,7 +16,7 @@ import time
 import unittest
 from pathlib import Path
 
-from program import PROGRAM, QUICK, SLOW, ProgramTest
+from program import PROGRAM, QUICK, SLOW, ProgramTest, study
 
 MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
 sys.path[:0] = [sys.argv[2], str(Path(__file__).resolve().parents[1] / "support")]
@@ -216,6 +216,7 @@ class Ranks(Charts):
                 self.assertEqual(row[name], other[name], name)
         self.assertFalse((self.folder / "ranks.ranks").exists())
 
+    @study
     def test_killed_in_between_it_goes_on(self):
         slow = QUICK.replace("end = 0.2\noutput = [0.01, 0.05]", "end = 0.05\nmax_order = 2")
         self.write("case.toml", slow + "[discretisation]\nelements = 40\n")

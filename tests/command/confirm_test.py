@@ -17,7 +17,7 @@ from pathlib import Path
 
 MPIRUN = sys.argv[2] if len(sys.argv) > 2 else None
 
-from program import PROGRAM, ProgramTest
+from program import PROGRAM, ProgramTest, study
 
 # A tube with the area of a short wave too many, at fixed area and volume: with c = H0 R = -1 it keeps that wave, with
 # H0 = 0 it stores the area better by flattening, m = 2, which tier 1 cannot see.
@@ -104,6 +104,7 @@ class Confirm(ProgramTest):
         self.assertIn("not a result of tubule scan", self.tubule("confirm", "case.toml", status=2)[1])
         self.assertFalse((self.folder / "scan_confirm").exists())
 
+    @study
     def test_under_a_force(self):
         # Area and volume are kept, the period is free: theory.md (3.22) gives the tension, (5.9) the rate of the ring.
         self.write("case.toml", CASE.replace('"overdamped"', '"overdamped"\nperiod = "free"')
@@ -173,6 +174,7 @@ class Ranks(ProgramTest):
     def figures(self, text):
         return [{key: value for key, value in row.items() if key != "file"} for row in csv.DictReader(io.StringIO(text))]
 
+    @study
     def test_killed_it_goes_on_and_says_the_same(self):
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         alone, _ = self.tubule("confirm", "scan.hdf", *self.command(1, "alone")[8:])

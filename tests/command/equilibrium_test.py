@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from program import CAPSULE, ProgramTest, about, series
+from program import CAPSULE, ProgramTest, about, series, study
 import scripts
 
 CASE = CAPSULE + "modes = 2\n"
@@ -51,6 +51,7 @@ class Equilibrium(ProgramTest):
         self.tubule("equilibrium", case, "--quiet", "-o", "other.hdf")
         self.assertIn("other.hdf", self.files())
 
+    @study
     def test_a_surface_from_a_profile(self):
         """The energy and the slowest rates of tier axisym, which tests/axisym compares with a spectral reference."""
         cell = self.write("cell.toml", CASE)

@@ -14,7 +14,7 @@ from random import Random
 import h5py
 import numpy as np
 
-from program import CAPSULE, OBLATE, ProgramTest, about, series
+from program import CAPSULE, OBLATE, ProgramTest, about, series, study
 
 CASES = Path(sys.argv[2])
 
@@ -78,6 +78,7 @@ class ModelChoice(ProgramTest):
         ):
             self.assertEqual(self.chosen(*quick, *given), ("fluid", f"whether a simpler model does is unknown: {why}"))
 
+    @study
     def test_other_tiers(self):
         short = ("accuracy.energy=1e-2", "time.end=0.05", "time.output=[]")
         for tier, given in (("auto", short), ("surface3d", (
@@ -85,6 +86,7 @@ class ModelChoice(ProgramTest):
             self.assertEqual(self.chosen(f"tier={tier}", *given)[0], "overdamped")
             self.expect_same("named.toml", OVERDAMPED, f"tier={tier}", *given)
 
+    @study
     def test_waves_around_the_axis_that_grow(self):
         # cases/auto_buckles.toml: by the dispersion relation m = 1 grows.
         self.write("case.toml", (CASES / "auto_buckles.toml").read_text().replace('"overdamped"', '"auto"\ngamma = 2.0'))
@@ -93,6 +95,7 @@ class ModelChoice(ProgramTest):
         self.assertIn('model.kind = "fluid": whether a simpler model does is unknown: trial runs of simpler models do not come '
                       "to the end as axisymmetric ones", out)  # fmt: skip
 
+    @study
     def test_starts_without_symmetry(self):
         # Trial runs on 80 triangles, for Re = 0.05 without friction. Stokes flow of the ellipsoid differs by 1.5e-3 from the
         # fluid, by runs of both; that of the tube, whose small waves grow, by 0.1: docs/decisions/tiers.md.

@@ -2,6 +2,7 @@
 import contextlib
 import csv
 import io
+import os
 import subprocess
 import sys
 import tempfile
@@ -12,6 +13,8 @@ from pathlib import Path
 import h5py
 
 PROGRAM = sys.argv[1]
+# Seconds long, and like another test: `tools/check --study` runs it.
+study = unittest.skipUnless(os.environ.get("TUBULE_STUDY"), "a study")
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests/support"))
 

@@ -21,7 +21,7 @@ import schema
 CASES = Path(sys.argv[2])
 MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
 
-from program import PROGRAM, ProgramTest, about, finished_points
+from program import PROGRAM, ProgramTest, about, finished_points, study
 
 FAMILY, VOLUME, H0 = "equilibrium.family", "equilibrium.reduced_volume", "energy.H0"
 ALL = f'{FAMILY}="prolate","oblate","stomatocyte"'
@@ -101,6 +101,7 @@ class Found(EquilibriaTest):
         self.assertEqual({entry["value"] for entry in document["equal_energies"]}, set(found.values()))
         self.assertEqual({entry["key"] for entry in document["equal_energies"]}, {VOLUME})
 
+    @study
     def test_pears_and_vesiculated_limits(self):
         """Energies of limits: scipy.optimize.brentq for R^2 + r^2 = 1, R^3 + r^3 = v."""
         self.scan("vesicle.toml", f'--over={FAMILY}="prolate","pear"', f"--over={VOLUME}=0.77,0.9",
@@ -135,6 +136,7 @@ class Found(EquilibriaTest):
                 self.assertAlmostEqual(abs(values[0, 0]), 0.01, delta=1e-9)
                 self.assertAlmostEqual(values[0, 0], -values[0, 1], delta=1e-9)
 
+    @study
     def test_along_a_line_only(self):
         """The points along the lines alone, and the crossings that the whole map has there."""
         over = (f"--over={ALL}", f"--over={VOLUME}=0.55:0.7:11", f"--over={H0}=-0.2,-0.1,0", ROUGH)
@@ -151,6 +153,7 @@ class Found(EquilibriaTest):
 class Grown(EquilibriaTest):
     OVER = (f"--over={ALL}", f"--over={VOLUME}=0.55,0.6,0.65,0.7", f"--over={H0}=-0.2,-0.1,0", ROUGH)
 
+    @study
     def test_on_two_axes_merged_and_across_ranks(self):
         self.scan("vesicle.toml", *self.OVER, "-o", "whole.hdf")
         self.scan("vesicle.toml", f"--over={ALL}", f"--over={VOLUME}=0.55,0.65", f"--over={H0}=-0.2,0", ROUGH, "-o", "scan.hdf")

@@ -22,7 +22,7 @@ import numpy as np
 CASES = Path(sys.argv[2])
 MPIRUN = sys.argv[3] if len(sys.argv) > 3 else None
 
-from program import PROGRAM, UNDULATED_TUBE, ProgramTest, about, finished_points
+from program import PROGRAM, UNDULATED_TUBE, ProgramTest, about, finished_points, study
 
 AMPLITUDE, K42 = "shape.mode.0.amplitude", "energy.k42"
 
@@ -415,6 +415,7 @@ class Ranks(Kill):
         command = [*self.mpirun(ranks), PROGRAM, "scan", *map(str, arguments), "-o", str(self.result)]
         return subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
 
+    @study
     def test_disturbed_again_and_again(self):
         """A rank dies: MPI ends the others, and a resumed scan loses nothing."""
         status, known = self.disturbed(signal.SIGKILL, 2, self.mpirun(3))

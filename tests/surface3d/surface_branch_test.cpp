@@ -37,7 +37,7 @@ SurfaceEquilibrium at_rest(double v, double radius, double half, const SurfaceEq
 }
 
 // Energies of `tubule equilibrium` in tier axisym, with accuracy.energy = 1e-10.
-TEST(SurfaceBranch, prolates) {
+TEST(SurfaceBranchStudy, prolates) {
     const SurfaceEquilibrium start = at_rest(0.9, 0.9, 1.4, {.accuracy = 1e-3, .first_triangles = 80});
     ASSERT_EQ(start.stop, Stop::finished) << start.message;
     BranchSettings settings;
