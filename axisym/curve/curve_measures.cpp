@@ -70,9 +70,11 @@ std::optional<std::array<double, 2>> self_intersection(const CurveSpace& space, 
     const auto side = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     };
+    const bool torus = space.topology() == Topology::tube && space.rise() == 0;  // the last chord ends on the first
     for (int i = 0; i + 1 < n; ++i) {
         const double bottom = std::min(p[i][1], p[i + 1][1]), top = std::max(p[i][1], p[i + 1][1]);
         for (int j = i + 2; j + 1 < n; ++j) {
+            if (torus && i == 0 && j + 2 == n) continue;
             if (std::max(p[j][1], p[j + 1][1]) < bottom || std::min(p[j][1], p[j + 1][1]) > top) continue;
             if (side(p[i], p[i + 1], p[j]) * side(p[i], p[i + 1], p[j + 1]) < 0 &&
                 side(p[j], p[j + 1], p[i]) * side(p[j], p[j + 1], p[i + 1]) < 0)

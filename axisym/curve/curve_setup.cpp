@@ -124,7 +124,8 @@ void require_place(const Problem& c, const Curve& shape) {
             if (p.is_wall()) distance = std::min(distance, p.distance(at[0], at[2]));
     }
     const bool tube = shape.topology == Topology::tube || shape.topology == Topology::half_tube;
-    require_place(c, !tube, bending_energy(shape, c.energy).potential, distance);
+    const bool closed = !tube || shape.length == 0;  // a torus
+    require_place(c, closed, bending_energy(shape, c.energy).potential, distance);
 }
 
 double bead_distance(const Problem& c, const Curve& shape) {

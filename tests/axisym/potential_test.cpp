@@ -177,6 +177,22 @@ TEST(Potential, branchesVaryTheStrength) {
                 1e-3 * std::abs(o["energy"][2] - o["energy"][0]));
 }
 
+// A torus of radii R and a in the field z^2 + r: INT W = 2 pi^2 R a^3 + 4 pi^2 a (R^2 + a^2/2) at first, then the
+// energy balances.
+TEST(Potential, toriMoveInFields) {
+    const double R = 2, a = 0.7;
+    const Outcome o = run_case(parse_case(
+        "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[[energy.potential]]\nkind = \"formula\"\nformula = \"z^2 + "
+        "r\"\n[shape]\nkind = \"torus\"\nradius = 2\ntube_radius = 0.7\n[accuracy]\nenergy = 1e-5\n[time]\nend = "
+        "0.05\n",
+        {}, "case.toml"));
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const double W = 2 * pi * pi * R * std::pow(a, 3) + 4 * pi * pi * a * (R * R + a * a / 2);
+    EXPECT_NEAR(o["potential_energy"].front(), W, 1e-9 * W);
+    EXPECT_LT(o["potential_energy"].back(), 0.8 * W);
+    for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-5 * o.summary.reference_energy);
+}
+
 TEST(Potential, wallsAreNotPassed) {
     // A sphere that a pressure inflates into a weak wall; one where a formula of the place ceases to be defined.
     const std::string inflated =
