@@ -82,17 +82,6 @@ bool is_flat(const Curve& shape) {
     return true;
 }
 
-// No other shape has the area and the volume of a sphere, or of a straight tube with its period: what would deform it
-// is refused, since no multiplier then holds the volume.
-void refuse_to_deform(const Problem& c) {
-    const std::string why =
-        "would deform a sphere, a straight tube or a part of one whose area and volume are fixed, and no other shape "
-        "has these: free one of them (model.area, model.volume), or begin with another shape";
-    if (c.law.beads) throw complaint(c, "model.bead_width", why);
-    if (!c.energy.potentials.empty()) throw complaint(c, "energy.potential", why);
-    if (c.energy.H0_varies()) throw complaint_about_H0(c, why);
-}
-
 // H0 is a property of the points of the initial shape.
 void fix_H0(const Problem& c, CurveForms& forms, const Eigen::VectorXd& x) {
     if (!c.energy.H0_varies()) return;

@@ -98,6 +98,15 @@ void require_beads(const Problem& c, bool closed, double distance) {
             distance));
 }
 
+void refuse_to_deform(const Problem& c) {
+    const std::string why =
+        "would deform a sphere, a straight tube or a part of one whose area and volume are fixed, and no other shape "
+        "has these: free one of them (model.area, model.volume), or begin with another shape";
+    if (c.law.beads) throw complaint(c, "model.bead_width", why);
+    if (!c.energy.potentials.empty()) throw complaint(c, "energy.potential", why);
+    if (c.energy.H0_varies()) throw complaint_about_H0(c, why);
+}
+
 namespace {
 
 constexpr double no_change = 1e-9;  // of E_ref: the shape was in equilibrium

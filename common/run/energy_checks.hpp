@@ -30,6 +30,10 @@ void require_place(const Problem& c, bool closed, double energy, double distance
 // CaseError where beads have no place on the initial shape: none with two poles, or poles that are too near.
 void require_beads(const Problem& c, bool closed, double distance);
 
+// CaseError for what would deform a sphere, or a straight tube with its period, of fixed area and volume: no other
+// shape has these, and no multiplier then holds the volume.
+void refuse_to_deform(const Problem& c);
+
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.
 std::string key_of_ill_posed(const Problem& c);

@@ -87,6 +87,8 @@ void SurfaceSimulation::begin(const Start& from) {
     memory_.next_step =
         case_.surface.step.value_or(std::min(first_step * memory_.scale.relaxation, case_.time.end - begin_time()));
     use_mesh(start.mesh);
+    const SurfaceLaw& law = surface().law();
+    if (law.keeps_volume && surface().area_is_volume(start.mesh, surface().fields(start.mesh))) refuse_to_deform(case_);
     const VectorField u = start_velocity(case_, start);
     state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped(), {}, begin_time())
                           : surface().start(start.mesh, begin_time());

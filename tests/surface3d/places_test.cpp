@@ -117,7 +117,7 @@ end = 0.5
 )";
     for (const std::string kind : {"fluid", "overdamped"}) {
         SCOPED_TRACE(kind);
-        const Outcome o = run_case(drawn, {"model={kind=\"" + kind + "\", gamma=2}"});
+        const Outcome o = run_case(drawn, {"model={kind=\"" + kind + "\", gamma=2, volume=\"free\"}"});
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         const bool inert = kind == "fluid";
         const double speed = inert ? (1 - std::exp(-1.0)) / 2 : 0.5, way = inert ? (0.5 - speed) / 2 : 0.25;
@@ -240,6 +240,9 @@ TEST(Places, Guards) {
     EXPECT_NE(refused(inflated, {"energy.potential.0.z=-0.9"}).find("a point of it is 0.1 behind one"),
               std::string::npos);
     EXPECT_NE(refused(pulled, {"model.bead_width=1.2"}).find("must be small beside the shape"), std::string::npos);
+    EXPECT_NE(
+        refused(pulled, {"model={kind=\"overdamped\", bead_width=0.3, force=5}"}).find("no other shape has these"),
+        std::string::npos);
     EXPECT_NE(refused(inflated, {"shape={kind=\"tube\", radius=1, length=6}"}).find("only valid with a closed surface"),
               std::string::npos);
 }
