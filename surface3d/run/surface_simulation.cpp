@@ -177,8 +177,7 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::try_step(double tau
     const auto failed = [&](const std::string& what) {
         if (may_be_undefined(now_.domain)) return Refusal{0.25, undefined_energy(now_, t)};
         if (may_be_undefined(now_.pressure_domain)) return Refusal{0.25, undefined_pressure(now_.pressure_domain, t)};
-        return Refusal{0.25,
-                       {Stop::solver_failed, t, what, "try another discretisation.elements or discretisation.order"}};
+        return Refusal{0.25, {Stop::solver_failed, t, what, advice_where_it_fails()}};
     };
     try {
         surface().linear_work() = {};
@@ -408,9 +407,16 @@ std::optional<StopReport> SurfaceSimulation::adapt_mesh() {
     return std::nullopt;
 }
 
+std::string SurfaceSimulation::advice_where_it_fails() const {
+    const MotionLaw& law = case_.law;
+    if (law.beads && law.beads->extension && !law.area_is_free() && law.keeps_volume)
+        return "fixed area and volume allow only some distances of the beads: free one of them, end the extension "
+               "earlier, or try another discretisation.elements";
+    return "try another discretisation.elements or discretisation.order";
+}
+
 StopReport SurfaceSimulation::failure(const SolveError& error) {
-    return {Stop::solver_failed, state_.time, error.what(),
-            "try another discretisation.elements or discretisation.order"};
+    return {Stop::solver_failed, state_.time, error.what(), advice_where_it_fails()};
 }
 
 // At walls and beads.

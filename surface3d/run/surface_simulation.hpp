@@ -98,6 +98,7 @@ private:
 
     std::optional<StopReport> check_state() const;
     std::optional<StopReport> check_crossing(bool at_output);
+    std::string advice_where_it_fails() const;
     double most_coarse() const;
     bool is_coarse() const;
     double volume_drift() const;

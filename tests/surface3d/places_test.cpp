@@ -234,6 +234,13 @@ TEST(Places, Guards) {
     EXPECT_EQ(bead.summary.stop.reason, Stop::resolution_lost);
     EXPECT_NE(bead.summary.stop.message.find("times model.bead_width apart"), std::string::npos)
         << bead.summary.stop.message;
+    const Outcome full =
+        run_case(pulled, {"model={kind=\"overdamped\", bead_width=0.3, extension={time=[0, 0.01], value=[0, 0.9]}}",
+                          "shape={kind=\"ellipsoid\", a=1, b=1, c=1.1}", "accuracy.estimate=false",
+                          "discretisation.step=0.005"});
+    EXPECT_EQ(full.summary.stop.reason, Stop::solver_failed);
+    EXPECT_NE(full.summary.stop.advice.find("fixed area and volume allow only some"), std::string::npos)
+        << full.summary.stop.message;
     const auto refused = [](const std::string& text, const std::vector<std::string>& sets) {
         return test::message_of<CaseError>([&] { run_case(text, sets); });
     };
