@@ -77,8 +77,8 @@ class GraphError {
 public:
     // The transport begins anew with this observation.
     void begin(const Observation& o) { dissipation_last_ = o.dissipation, steps_since_ = 0; }
-    // Whether to transport the error after a step: after each long step of a one-step method, or when some short ones
-    // of backward differences have changed the shape.
+    // Whether to transport the error after a step: after each long step of a one-step method, or when some short
+    // ones of backward differences have changed the shape.
     bool due(const Observation& o, bool rosenbrock);
     void transport(ErrorTransport& transport, const Observation& o);
     // Whether it exceeds what is allowed, for a reason that a finer mesh or a smaller tolerance in time remedies, where

@@ -1,6 +1,6 @@
 // Splines over one cell of a profile: degree p, any knots, any smoothness at the knots, even or odd at planes of
-// symmetry, without conditions at open ends. Cubic and quintic Hermite elements are the special cases (3, 1) and (5, 2)
-// of (degree, smoothness).
+// symmetry, without conditions at open ends. Cubic and quintic Hermite elements are the special cases (3, 1) and (5,
+// 2) of (degree, smoothness).
 #pragma once
 
 #include <Eigen/Core>

@@ -58,7 +58,7 @@ struct StepSystem {
     Eigen::VectorXd pressure_load;  // (1, q) in the rows of the pressure: b -= rate * this makes div_P u = rate
     Eigen::VectorXd widening;       // the rate of the area, -(H*, v.nu); of extensible membranes
     Eigen::VectorXd turning;        // the rate of M = INT H, -(2 K, u.nu): theory.md (2.20)
-    // Of each bead the rates of G and dG/dP, theory.md (2.23), and of their distance.
+    // The rates of G and dG/dP of each bead, theory.md (2.23), and that of their distance.
     Eigen::Matrix<double, Eigen::Dynamic, 4> beads;
     Eigen::VectorXd pulling(const BeadNumbers& at) const { return -at[1] * beads.col(0) - at[3] * beads.col(2); }
     Eigen::VectorXd force;  // (b, v) on X*, of potentials, too, in the rows of the velocity

@@ -30,7 +30,7 @@ Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, boo
         out.bottomRows(all / 2) /= size;
     }
     if (!with_beads) return out;
-    // Of these, the ones that are such a motion.
+    // Those that are combinations of what the potentials leave.
     Eigen::MatrixXd along_axis = Eigen::MatrixXd::Zero(all, 0);
     for (const int motion : {along, around}) {
         const Eigen::VectorXd unit = Eigen::VectorXd::Unit(all, motion);

@@ -58,8 +58,8 @@ public:
     // A spontaneous curvature that varies, at the nodes, before anything else. From then on nodes are material.
     void carry_H0(const Eigen::VectorXd& H0) { H0_ = H0; }
     const Eigen::VectorXd& H0() const { return H0_; }
-    // Beads: positions, and multipliers for a force of 1, SolveError where they have none; d^2G/dP^2 of one; the rate
-    // of their distance as the nodes move at velocities v.
+    // Beads: positions, and multipliers for a force of 1, SolveError where they have none; d^2G/dP^2 of one; the
+    // rate of their distance as the nodes move at velocities v.
     const std::optional<BeadEquations>& beads() const { return beads_; }
     BeadNumbers bead_numbers(const CurvedMesh& mesh) const;
     double bead_bend(const CurvedMesh& mesh, int bead, double P) const;

@@ -248,9 +248,9 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
-// How the positions P and multipliers q of beads, theory.md (2.23), follow the surface from X*, to first order. Nothing
-// of this may be explicit: where a viscous membrane is flat, it does not resist motion along its normal. Columns: of
-// each bead P and q, then the force that holds the distance beyond the expected one.
+// How the positions P and multipliers q of beads, theory.md (2.23), follow the surface from X*, to first order. This must
+// be implicit: where a viscous membrane is flat, it does not resist motion along its normal. Columns: P and q of each
+// bead, then the force that holds the distance beyond the expected one.
 void StepSolver::add_beads(const StepBase& base, const Extent& rate, BorderedSolver::Border& border,
                            Eigen::Index& n) const {
     const Eigen::Index first = n, force = n + numbers_of_beads;

@@ -255,8 +255,8 @@ TEST(CurveGuards, aParameterStretchedTooFar) {
 }
 
 TEST(CurveGuards, stepsThatLeadNowhere) {
-    // 2000 steps in which the time does not grow by a thousandth, nor the energy falls, and which are shorter than 1e-9
-    // of the end.
+    // 2000 steps in which the time does not grow by a thousandth, nor the energy falls, and which are shorter than
+    // 1e-9 of the end.
     const auto steps_until_stop = [](double step, double end) {
         Stall stall(2000, 1e-9 * end, 1e-4, "set discretisation.elements");
         double time = 1;

@@ -8,8 +8,8 @@ import unittest
 
 from program import ProgramTest, about, series
 
-# Both runs of its first pair take every step as fast as steps may grow, at any tolerance. The energy at the end is that
-# of runs asked for 1e-6, 1e-7 and 1e-8, which agree to all digits given.
+# Both runs of its first pair take every step as fast as steps may grow, at any tolerance. The energy at the end is
+# that of runs asked for 1e-6, 1e-7 and 1e-8, which agree to all digits given.
 SHORT = """tier = "axisym"
 energy = {k20 = 0.7117, k42 = -0.02922}
 model = {kind = "stokes", Re = 1.93, gamma = 0.5}

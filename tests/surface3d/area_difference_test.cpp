@@ -73,8 +73,8 @@ double rate_of(const CurvedMesh& mesh, const VectorField& v, const Quantity& qua
 }
 
 TEST(AreaDifference, theForceApproachesTheRateOfTheEnergy) {
-    // theory.md (2.20): minus the power of the force is the rate of E, and the row of M is that of M, up to the error
-    // of the fields.
+    // theory.md (2.20): minus the power of the force is the rate of E, and the row of M is that of M, up to the
+    // error of the fields.
     const Bending bending = with_alpha(0.4, -20);
     const Sphere wavy{.radius = 1, .modes = {{0.15, 2, 1}, {0.1, 3, 2}}};
     const MotionLaw law = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma = 0.5, .keeps_volume = {}});

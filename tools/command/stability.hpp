@@ -68,8 +68,8 @@ std::string fit_report(const StabilityOptions& options, const StabilitySubject& 
 std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject,
                         const std::vector<Problem>& models);
 
-// <a^2> of the displacement a phi with INT phi^2 dS = A, theory.md (8.12). Throws std::invalid_argument, with the name
-// of the mode, where an eigenvalue of this scale is not positive: the shape is no minimum.
+// <a^2> of the displacement a phi with INT phi^2 dS = A, theory.md (8.12). Throws std::invalid_argument, with the
+// name of the mode, where an eigenvalue of this scale is not positive: the shape is no minimum.
 double mean_square(double kT, double eigenvalue, double scale, double area, const std::string& mode);
 void refuse_motion(const std::string& why);  // of a shape that is asked about at a kT
 

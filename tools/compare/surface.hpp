@@ -19,8 +19,8 @@ struct Place {
     Eigen::Vector2d at = Eigen::Vector2d::Zero();
 };
 
-// A quadrature point (weight: area) or, with weight 0, an additional sample; `reach` is the distance, in coordinates,
-// of the next samples.
+// A quadrature point (weight: area) or, with weight 0, an additional sample; `reach` is the distance, in
+// coordinates, of the next samples.
 struct Sample {
     Place place;
     Eigen::Vector2d reach;
