@@ -300,6 +300,7 @@ bool SurfaceSimulation::thin_to(int triangles, double most_jump) {
         const std::vector<MeshPoint> places = places_of_nodes(to, from);
         const CurvedMesh now = surface().mesh(state_), next = moved_to(places, now, to);
         if (!(mesh_quality(next).worst > quality_of_thinner)) return false;
+        if (is_reported() && coarseness_of(next) > finer_at * most_coarse()) return false;
         if (!change_mesh(next, values_at(places, now, carried()), most_jump)) return false;
     } catch (const SolveError&) {
         return false;
@@ -422,6 +423,13 @@ StopReport SurfaceSimulation::failure(const SolveError& error) {
 // At walls and beads.
 double SurfaceSimulation::most_coarse() const {
     return coarsest_place * (is_reported() ? 1 : farther_apart);
+}
+
+double SurfaceSimulation::coarseness_of(const CurvedMesh& mesh) const {
+    const double at_walls = wall_coarseness(mesh, case_.energy.potentials).value;
+    if (!surface().beads()) return at_walls;
+    const BeadNumbers beads = bead_numbers(SurfaceSpace(mesh), mesh, *surface().beads(), 1);
+    return std::max(at_walls, bead_coarseness(mesh, beads, surface().beads()->width()).value);
 }
 
 bool SurfaceSimulation::is_coarse() const {

@@ -100,6 +100,7 @@ private:
     std::optional<StopReport> check_crossing(bool at_output);
     std::string advice_where_it_fails() const;
     double most_coarse() const;
+    double coarseness_of(const CurvedMesh& mesh) const;
     bool is_coarse() const;
     double volume_drift() const;
     void warn_of_drift();
