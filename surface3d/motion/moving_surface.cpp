@@ -61,7 +61,8 @@ MovingSurface::MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, cons
 }
 
 MotionState MovingSurface::start(const CurvedMesh& mesh, double time) {
-    MotionState s{.time = time};
+    MotionState s;
+    s.time = time;
     s.X = node_positions(mesh), s.period = mesh.period;
     s.w = VectorField::Zero(3, mesh.size());
     s.u = Eigen::VectorXd::Zero(law_.components() * mesh.size());

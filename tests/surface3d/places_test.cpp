@@ -37,7 +37,7 @@ TEST(Places, ForcesAreRatesOfEnergyAndDistance) {
         particle(0.6, 1.3, 0.3),
         {.kind = Potential::Kind::formula,
          .formula = std::make_shared<const Formula>(parse_formula("0.3*x*z + exp(y) + z^2", Potential::in_space))}};
-    SurfaceLaw law = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma = 0.5});
+    SurfaceLaw law = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma = 0.5, .keeps_volume = {}});
     law.beads = Beads{0.3, {}};
     std::vector<double> left;
     for (const int n : {3, 6}) {
@@ -50,7 +50,8 @@ TEST(Places, ForcesAreRatesOfEnergyAndDistance) {
         const auto distance = [&](const CurvedMesh& m) { return bead_distance(m, law.beads->width); };
         MovingSurface surface(mesh, law, bending, {});
         const MotionUnknowns unknowns(mesh, law, bending);
-        StepBase base{.mesh = &mesh, .fields = surface.fields(mesh)};
+        StepBase base;
+        base.mesh = &mesh, base.fields = surface.fields(mesh);
         base.displacement = base.mesh_velocity = VectorField::Zero(3, mesh.size());
         base.velocity = base.past = Eigen::VectorXd::Zero(3 * mesh.size());
         base.te = 0.1, base.beads = &*surface.beads(), base.bead_numbers = surface.bead_numbers(mesh), base.force = 2;
