@@ -165,5 +165,43 @@ end = 0.01
         self.assertNotIn("triangles", end)
 
 
+class Walls(ProgramTest):
+    def test_a_vesicle_at_a_wall_loses_its_axis(self):
+        """It goes on in three dimensions with the same energies: the wall is where it was."""
+        case = """tier = "auto"
+[energy]
+k20 = 0.5
+[[energy.potential]]
+kind = "plane"
+z = -1.2
+strength = 0.2
+range = 0.4
+[model]
+kind = "gradient-flow"
+area = "fixed"
+volume = "fixed"
+[shape]
+kind = "ellipsoid"
+a = 1.0
+b = 1.0
+c = 0.5
+[auto]
+noise = 3e-3
+[accuracy]
+energy = 1e-2
+[time]
+end = 0.118
+"""
+        result = self.folder / "wall.hdf"
+        self.tubule("run", self.write("wall.toml", case), "--quiet", "-o", result)
+        self.assertEqual(about(result)["choice"], "axisym, then surface3d")
+        with h5py.File(result) as file:
+            tier, energy, potential = (file["series"][name][()] for name in ("tier", "energy", "potential_energy"))
+        first = int((tier == 2).argmax())
+        self.assertLess(potential[first], -0.1)
+        for values in (energy, potential):
+            self.assertAlmostEqual(values[first], values[first - 1], delta=5e-3 * about(result)["E_ref"])
+
+
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])

@@ -244,7 +244,7 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
               "points");
 }
 
-// A frame of a patch of tier axisym is no closed surface.
+// A patch, which a frame of tier axisym may be, is no closed surface.
 TEST(SurfaceRun, RefusesAPatch) {
     Record frame;
     frame.kind = RecordKind::equilibrium, frame.numbers = {{"length", 0.0}};

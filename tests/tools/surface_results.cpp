@@ -2,10 +2,10 @@
 //
 //   surface_results FOLDER
 //
-// closed_K.hdf and tube_K.hdf, K = 2, 3, 4: flat triangulations moved by a polynomial map of degree K, which elements
-// of order K represent exactly (vtk_test.py knows the map). Two frames, the second one twice as large. mixed.hdf: two
-// meshes, one after the other. shapes_*.hdf: known shapes with recovered curvatures, for pictures. growing_*.hdf: waves
-// that grow at known rates, 1e-3 exp(0.5 t) for n, m = 1, 2 of a tube and l, m = 3, 1 of a sphere.
+// closed_K.hdf and tube_K.hdf, K = 2, 3, 4: flat triangulations moved by a polynomial map of degree K, which
+// elements of order K represent exactly (vtk_test.py knows the map). Two frames, the second one twice as large.
+// mixed.hdf: two meshes, one after the other. shapes_*.hdf: known shapes with recovered curvatures, for pictures.
+// growing_*.hdf: waves that grow at known rates, 1e-3 exp(0.5 t) for n, m = 1, 2 of a tube and l, m = 3, 1 of a sphere.
 #include <cmath>
 #include <filesystem>
 #include <string>

@@ -73,7 +73,7 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
 double mean_square(double kT, double eigenvalue, double scale, double area, const std::string& mode);
 void refuse_motion(const std::string& why);  // of a shape that is asked about at a kT
 
-// One mode: its growth rate, and its waves around the axis; m = -1: of a shape without one.
+// One mode: its growth rate and its m; -1 for a shape without an axis.
 struct SlowMode {
     double rate;
     int m;

@@ -17,9 +17,9 @@ struct Advice {
     std::string reason;             // in words
 };
 
-// Takes a few seconds at most: the run itself, in tier axisym, and those of simpler models. `expected` is the forecast
-// of the case as it is. None where nothing moves. Throws as an engine and its run; Paused where a PauseWatch of this
-// thread ends one of them.
+// Takes a few seconds at most: the run itself, in tier axisym, and those of simpler models. `expected` is the
+// forecast for the case as it is. None where nothing moves. Throws as an engine and its run; Paused where a PauseWatch
+// in this thread ends one of them.
 std::optional<Advice> advice(const Problem& c, const Forecast& expected);
 
 // "tier axisym, model overdamped, accuracy 1e-06: some 0.1 s; ...", "tier surface3d, model stokes, 80 elements, ..."
