@@ -80,8 +80,8 @@ auto by_energy(const Bending& bending, const Kernel& kernel) {
 
 }  // namespace
 
-CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
-    : space_(space), bending_(bending), W_(potential_density(bending.potentials)), images_(space.images()) {
+CurveForms::CurveForms(const CurveSpace& space, const Bending& bending) : space_(space), images_(space.images()) {
+    set_bending(bending);
     const int w = space.splines().width(), n = space.splines().elements();
     const auto dof = [&](int e, int a) {  // -1: absent
         const SplineSpace& field = a < w ? space.r() : space.z();
@@ -112,6 +112,11 @@ CurveForms::CurveForms(const CurveSpace& space, const Bending& bending)
                 }
                 slots_.push_back(slot);
             }
+}
+
+void CurveForms::set_bending(const Bending& bending) {
+    bending_ = bending, W_ = potential_density(bending.potentials);
+    if (bending.kg != 0 && !gradients_) gradients_.emplace(space_);
 }
 
 template <int P>
@@ -238,6 +243,7 @@ bool CurveForms::add_gradient(const Weights& weights, const double* x, double* o
         return for_degree(space_.splines().degree(), [&](auto P) { return gradient_kernel<P()>(weights, H0, x, out); });
     });
     if (W_ && weights.energy != 0) add_potential_gradient(space_, *W_, weights.energy, x, out);
+    if (const double kg = weights.energy * bending_.kg; kg != 0) gradients_->add_gradient(kg, x, out);
     return inside && ((bending_.terms.empty() && !bending_.H0_varies() && !W_) ||
                       std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
@@ -247,6 +253,7 @@ void CurveForms::add_hessian(const Weights& weights, const double* x, double* va
         for_degree(space_.splines().degree(), [&](auto P) { hessian_kernel<P()>(weights, H0, x, values); });
     });
     if (W_ && weights.energy != 0) add_potential_hessian(space_, *W_, weights.energy, x, slots_, values);
+    if (const double kg = weights.energy * bending_.kg; kg != 0) gradients_->add_hessian(kg, x, slots_, values);
     if (!space_.free_period()) return;
     const int rise = space_.shape_size();
     double* column = values + pattern_.outerIndexPtr()[rise];  // all rows, in order
@@ -260,6 +267,7 @@ void CurveForms::add_hessian(const Weights& weights, const double* x, double* va
 template <class Add>
 void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const Add& add) const {
     const SplineSpace& splines = space_.splines();
+    if (const double kg = weights.energy * bending_.kg; kg != 0) gradients_->each_by_rise(kg, x, add);
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
             const auto& basis = splines.basis(e, g);
@@ -292,7 +300,8 @@ double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& 
             sum += load(splines.basis(e, g).weight) *
                    (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
         }
-    return images_ * stdx::reduce(sum);
+    const double kg = weights.energy * bending_.kg;
+    return images_ * stdx::reduce(sum) + (kg != 0 ? kg * gradients_->stretch_slope(x.data()) : 0);
 }
 
 namespace {
@@ -479,17 +488,21 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
             const auto f = density_at(bending_, at_H0, p.H, p.K);
             const Pack s = principal_symbol(f, p.kappa_theta);
             const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-            o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
+            if (bending_.kg == 0) o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
+            const double size = splines.breaks()[e + 1] - splines.breaks()[e];
             const Pack ig2 = p.inverse_speed * p.inverse_speed;
             stiffness[e] += stdx::reduce(dA * ig2 * ig2 * stdx::abs(s));
             const Pack bent = stdx::max(stdx::abs(low), stdx::abs(high));
             for (int i = 0; i < lanes; ++i) {
+                o.g_min = std::min(o.g_min, static_cast<double>(speed[i]));
+                o.g_max = std::max(o.g_max, static_cast<double>(speed[i]));
                 if (at.r[i] < o.r_min) o.r_min = at.r[i], o.s_min = basis.z[i];
                 if (at.r[i] > o.r_max) o.r_max = at.r[i], o.s_max = basis.z[i];
                 if (bent[i] > o.curvature) o.curvature = bent[i], o.s_curvature = basis.z[i];
-                if (s[i] < o.symbol) o.symbol = s[i], o.s_symbol = basis.z[i];
-                o.g_min = std::min(o.g_min, static_cast<double>(speed[i]));
-                o.g_max = std::max(o.g_max, static_cast<double>(speed[i]));
+                if (bending_.kg == 0 && s[i] < o.symbol) o.symbol = s[i], o.s_symbol = basis.z[i];
+                if (bending_.kg == 0 || s[i] >= 0) continue;
+                const double coarse = size * speed[i] * std::sqrt(-s[i] / (2 * bending_.kg));
+                if (coarse > o.coarse) o.coarse = coarse, o.s_coarse = basis.z[i];
             }
         }
     o.area = images_ * stdx::reduce(area);
@@ -500,12 +513,15 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
     o.energy = o.energy_alpha = area_difference_energy(bending_, o.M);
     for (const Pack& term : terms) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
     if (W_) o.potential = observe_potential(space_, *W_, bending_.potentials, x.data()), o.energy += o.potential.energy;
+    std::vector<double> of_gradients;
+    if (bending_.kg != 0) o.energy += o.energy_kg = bending_.kg * gradients_->value(x.data(), &of_gradients);
     o.domain = domain(x);
-    if (defect) *defect = spline_defect(x, stiffness);
+    if (defect) *defect = spline_defect(x, stiffness, of_gradients);
     return o;
 }
 
-std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const {
+std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness,
+                                              const std::vector<double>& of_gradients) const {
     const SplineSpace& splines = space_.splines();
     const int n = splines.elements(), p = splines.degree();
     const auto& breaks = splines.breaks();
@@ -532,9 +548,12 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
     if (splines.cell().open_start) jump[0] = jump[1];
     if (splines.cell().open_end) jump[n] = jump[n - 1];
     std::vector<double> defect(n);
-    for (int e = 0; e < n; ++e)
-        defect[e] = images_ * splines.bernoulli_norm() / 4 * std::pow(size(e), 2 * (p - 1)) * stiffness[e] *
-                    (jump[e] * jump[e] + jump[e + 1] * jump[e + 1]);
+    for (int e = 0; e < n; ++e) {
+        double loss = images_ * splines.bernoulli_norm() * std::pow(size(e), 2 * (p - 1)) * stiffness[e];
+        if (!of_gradients.empty())
+            loss += splines.bernoulli_norm_of_third() * std::pow(size(e), 2 * (p - 2)) * bending_.kg * of_gradients[e];
+        defect[e] = loss / 4 * (jump[e] * jump[e] + jump[e + 1] * jump[e + 1]);
+    }
     return defect;
 }
 
@@ -553,7 +572,7 @@ double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
     const CurveObservation o = observe(x);
     if (space_.is_patch())
         magnitude += patch_scale(bending_, std::max(space_.evaluate(x, 0).r, space_.evaluate(x, 1).r));
-    return std::max(std::abs(o.energy), images_ * magnitude + o.energy_alpha + o.potential.magnitude);
+    return std::max(std::abs(o.energy), images_ * magnitude + o.energy_kg + o.energy_alpha + o.potential.magnitude);
 }
 
 }  // namespace tubule::axisym

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "axisym/curve/gradient_forms.hpp"
 #include "axisym/curve/potential_forms.hpp"
 #include "axisym/splines/curve_space.hpp"
 #include "common/energy/bending.hpp"
@@ -19,7 +20,7 @@ namespace tubule::axisym {
 struct VaryingH0;  // of packs, which depend on the machine's registers: not for those who include this
 
 // The functional energy INT f dS + area A + volume V + gauge J + M M of the whole cell or period, by its weights.
-// With the energy goes that of its potentials, INT W dS.
+// With the energy go its gradient term, kg INT |grad H|^2 dS, and its potentials, INT W dS.
 //   f = f(H, K)        V = INT pi r^2 z' ds        M = INT H dS
 //   J = 1/2 INT (d log g/ds)^2 ds, g = |X'|, theory.md (4.9)
 // All but J do not depend on the parametrisation; J vanishes for one in proportion to arc length, which every shape
@@ -34,6 +35,7 @@ struct Weights {
 struct CurveObservation {
     double energy = 0;                // with that of area differences
     std::vector<double> energy_term;  // of each term, see term_names()
+    double energy_kg = 0;             // theory.md (2.25)
     double energy_alpha = 0, M = 0;   // theory.md (2.19)
     double area = 0, volume = 0, gauge = 0;
     double length = 0;                                                  // of the meridian
@@ -44,18 +46,21 @@ struct CurveObservation {
     // Smallest principal symbol f_HH + 2 f_HK x + f_KK x^2: for x = kappa_theta, and for all x between the principal
     // curvatures: theory.md (2.14).
     double symbol = std::numeric_limits<double>::infinity(), s_symbol = 0, symbol_3d = symbol;
+    // With kg > 0 the symbol does not matter. Where it is negative, waves shorter than the scale sqrt(2 kg/|symbol|)
+    // are held by the gradient term alone: the longest element over that scale.
+    double coarse = 0, s_coarse = 0;
     PotentialObservation potential;  // its energy is part of `energy`
     FormulaDomain::Margin domain;    // of the energy's formula; its place is s
 };
 
 class CurveForms {
 public:
-    // Keeps the space, which must outlive it.
+    // Keeps the space, which must outlive it. Throws as GradientForms where kg > 0.
     CurveForms(const CurveSpace& space, const Bending& bending);
 
     const CurveSpace& space() const { return space_; }
     const Bending& bending() const { return bending_; }
-    void set_bending(const Bending& bending) { bending_ = bending, W_ = potential_density(bending.potentials); }
+    void set_bending(const Bending& bending);
     // Where H0 varies it is a function of the area below a point, until this fixes it to the parameters: H0 of s is
     // then what the formula gives at the point s of the curve x. Throws std::invalid_argument where that is no number.
     void fix_H0(const Eigen::VectorXd& x);
@@ -106,11 +111,13 @@ private:
     FormulaDomain::Margin domain(const Eigen::VectorXd& x) const;
     template <class Add>
     void add_rise_hessian(const Weights& weights, const double* x, const Add& add) const;
-    std::vector<double> spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness) const;
+    std::vector<double> spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness,
+                                      const std::vector<double>& of_gradients) const;
 
     const CurveSpace& space_;
     Bending bending_;
     std::optional<Formula> W_;                   // of its potentials
+    std::optional<GradientForms> gradients_;     // where kg > 0
     std::shared_ptr<const VaryingH0> fixed_H0_;  // none before fix_H0()
     Eigen::VectorXd fixed_on_;
     double images_;

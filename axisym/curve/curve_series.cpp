@@ -34,6 +34,7 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
                {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
+    if (c.energy.kg > 0) table.add({{"energy_kg", [](const CurveRow& r) { return r.now.o.energy_kg; }}});
     if (c.energy.alpha)
         table.add({{"energy_alpha", [](const CurveRow& r) { return r.now.o.energy_alpha; }},
                    {"M", [](const CurveRow& r) { return r.now.o.M; }}});

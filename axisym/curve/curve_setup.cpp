@@ -136,6 +136,7 @@ void require_patch(const Problem& c, const Curve& shape) {
     const auto refuse = [&](bool asked, const char* key, const char* why) {
         if (asked) throw complaint(c, key, why);
     };
+    refuse(c.energy.kg > 0, "energy.kg", "must be 0 where the shape is a patch");
     refuse(c.energy.alpha.has_value(), "energy.alpha", "must be absent: a patch has no area difference of its own");
     if (c.energy.H0_varies()) throw complaint_about_H0(c, "must be a number where the shape is a patch");
     refuse(c.discretisation.order == 5 && c.discretisation.smoothness == 1, "discretisation.smoothness",
@@ -155,6 +156,20 @@ void require_patch(const Problem& c, const Curve& shape) {
            "must leave the area or the volume free: of a part of a sphere or a cylinder they are one condition");
 }
 
+void require_gradients(const Problem& c, const Curve& shape) {
+    if (c.energy.kg == 0) return;
+    if (c.discretisation.smoothness == 1)
+        throw complaint(c, "discretisation.smoothness",
+                        "must be at least 2 where energy.kg is: curvature is continuous");
+    const std::optional<double> jump = jump_of_curvature(shape);
+    if (!jump) return;
+    const auto at = shape.at(*jump);
+    throw complaint(c, "energy.kg",
+                    fmt::format("must be 0 where the curvature of the initial shape jumps, here at r = {:.4g}, z = "
+                                "{:.4g}: |grad H|^2 has no integral there; begin with a smooth shape",
+                                at[0], at[2]));
+}
+
 InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
@@ -167,6 +182,7 @@ InitialShape initial_shape(const Problem& c) {
     }
     require_patch(c, whole);
     require_place(c, whole);
+    require_gradients(c, whole);
     const auto [area, volume] = area_and_volume(whole);
     const double length = c.law.beads ? bead_distance(c, whole) : whole.length;
     const auto* file = std::get_if<ProfileFile>(&c.shape);
@@ -237,6 +253,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
 
 Snapshot CurveSetup::with_exact_shape(Snapshot s) const {
     s.o.energy = start.bending.energy, s.o.energy_term = start.bending.energy_term;
+    s.o.energy_kg = start.bending.energy_kg;
     s.o.energy_alpha = start.bending.energy_alpha, s.o.M = start.bending.M;
     s.o.potential.energy = start.bending.potential;
     s.o.area = start.area, s.o.volume = start.volume;
@@ -296,11 +313,13 @@ CurveSettings settings_for(const Problem& c, const InitialShape& start, CurveSet
     const ArcLength arc(start.meridian);
     s.elements = std::max(s.elements, elements_for(c.energy.potentials, arc.total()));
     while (can_be_finer(s)) {
+        // Waves that only the gradient term holds need elements half as long as their scale.
         const auto space = space_of(c, start.meridian, first_breaks(arc, s, c, least_seam));
         CurveForms forms(*space, c.energy);
         const Eigen::VectorXd x = fit(*space, arc);
         fix_H0(c, forms, x);
-        if (!(std::abs(forms.observe(x).energy - start.bending.energy) > allowed)) break;
+        const CurveObservation o = forms.observe(x);
+        if (!(std::abs(o.energy - start.bending.energy) > allowed) && o.coarse <= 0.5) break;
         s.elements = static_cast<int>(std::ceil(1.5 * s.elements));
     }
     return s;

@@ -63,8 +63,10 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
         for (int i = 0; i < points; ++i)
             dA[i] = width * rule().weights[i] * 2 * pi * at(i, 0) * std::hypot(at(i, 1), at(i, 3));
         const Eigen::VectorXd label = ((within * dA).array() + below) / area;
+        Eigen::Matrix<double, points, 1> H;
         for (int i = 0; i < points; ++i) {
             const auto p = profile_point(at(i, 0), at(i, 1), slope(i, 1), at(i, 3), slope(i, 3));
+            H[i] = p.H;
             const double variables[]{label[i], at(i, 0), at(i, 2)};
             const double H0 = bending.H0_varies() ? evaluate(*bending.H0_formula, variables) : bending.H0;
             for_each_value_at(bending, H0, p.H, p.K,
@@ -77,11 +79,15 @@ ShapeEnergy energy_on_panels(const Curve& m, const Bending& bending, int panels,
             sum.magnitude += m.images() * magnitude(bending, H0, p.H, p.K) * dA[i];
         }
         below += dA.sum();
+        if (bending.kg == 0) return;
+        const Eigen::ArrayXd H_s = D * H / width;
+        sum.energy_kg += m.images() * bending.kg *
+                         (H_s.square() / (at.col(1).array().square() + at.col(3).array().square()) * dA.array()).sum();
     });
     if (is_patch(m.topology)) sum.magnitude += patch_scale(bending, std::max(m.at(0)[0], m.at(1)[0]));
     sum.energy = sum.energy_alpha = area_difference_energy(bending, sum.M);
-    sum.magnitude += sum.energy_alpha;
-    sum.energy += sum.potential;
+    sum.magnitude += sum.energy_alpha + sum.energy_kg;
+    sum.energy += sum.potential + sum.energy_kg;
     for (const double term : sum.energy_term) sum.energy += term;
     return sum;
 }
@@ -102,6 +108,24 @@ std::array<double, 2> area_and_volume(const Curve& m) {
         }
     });
     return {m.images() * area, m.images() * volume};
+}
+
+std::optional<double> jump_of_curvature(const Curve& m) {
+    constexpr double h = 1e-4, jump = 1e-3;  // of the parameter; relative to the largest curvature beside a seam
+    // The curvature of the profile at t, from one side.
+    const auto curvature = [&](double t, double side) {
+        const auto a = m.at(t), b = m.at(t + side * h), c = m.at(t + 2 * side * h);
+        const auto slope = [&](int k) { return side * (4 * b[k] - 3 * a[k] - c[k]) / (2 * h); };
+        return profile_point(a[0], a[1], slope(1), a[3], slope(3)).kappa_s;
+    };
+    const auto jumps = [&](double before, double after) {
+        const double left = curvature(before, -1), right = curvature(after, 1);
+        return std::abs(left - right) > jump * std::max(std::abs(left), std::abs(right));
+    };
+    for (const double seam : m.seams)
+        if (jumps(seam, seam)) return seam;
+    if (m.topology == Topology::tube && jumps(1, 0)) return 0;
+    return std::nullopt;
 }
 
 ShapeEnergy bending_energy(const Curve& m, const Bending& bending) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "common/energy/bending.hpp"
@@ -14,6 +15,7 @@ std::array<double, 2> area_and_volume(const Curve& meridian);
 
 struct ShapeEnergy {
     double energy = 0, magnitude = 0;  // the bending energy; the size of its terms, theory.md (11.1)
+    double energy_kg = 0;              // of the gradient term, part of both, theory.md (2.25)
     double energy_alpha = 0, M = 0;    // theory.md (2.19)
     double potential = 0;              // part of the energy
     std::vector<double> energy_term;   // of each term, see term_names()
@@ -23,5 +25,8 @@ double patch_scale(const Bending& bending, double radius);
 // To about 1e-10 of the magnitude, if the meridian is smooth between its seams. Not finite where the energy is not
 // defined on the shape.
 ShapeEnergy bending_energy(const Curve& meridian, const Bending& bending);
+
+// Where the curvature of a curve jumps, so that |grad H|^2 has no integral: its parameter. Empty if nowhere.
+std::optional<double> jump_of_curvature(const Curve& meridian);
 
 }  // namespace tubule::axisym

@@ -276,15 +276,14 @@ namespace {
 // Estimates the error on the last mesh but one from the energies on a sequence of meshes.
 class MeshComparison {
 public:
-    // Infinite until there are two in a row.
-    double operator()(double energy, int elements, int degree) {
+    // Infinite until there are two in a row. The error falls with this power of the number of elements.
+    double operator()(double energy, int elements, int power) {
         double error = std::numeric_limits<double>::infinity();
         if (elements_ > 0) {
             const double change = std::abs(energy - energy_);
-            // Two energies may be close by accident. The previous change, reduced by the order of convergence (at most
-            // 8), bounds the error, too.
-            const int order = std::min(2 * (degree - 1), 8);
-            error = std::max(change, change_ * std::pow(static_cast<double>(elements_) / elements, order));
+            // Two energies may be close by accident. The previous change, reduced by the order of convergence, bounds
+            // the error, too.
+            error = std::max(change, change_ * std::pow(static_cast<double>(elements_) / elements, power));
             change_ = change;
         }
         energy_ = energy, elements_ = elements;
@@ -390,7 +389,9 @@ std::optional<std::pair<Stop, std::string>> verdict(const StationaryProblem& pro
     std::string unknown = std::isfinite(out.estimated_error)
                               ? fmt::format("the error of the energy is still {:.1e}", out.estimated_error)
                               : "the error of the energy is not known yet";
-    if (out.estimated_error <= settings.accuracy) {
+    if (out.observed.coarse > 1)
+        unknown = "elements are longer than the scale of waves that the gradient term alone holds";
+    else if (out.estimated_error <= settings.accuracy) {
         if (const auto where = self_intersection(*out.space, out.x)) {
             const CurveSample p = out.space->evaluate(out.x, (*where)[0]);
             return {{Stop::self_intersection,
@@ -447,7 +448,8 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         if (problem.beads) out.beads = u.segment<4>(system.beads());
         out.rim = u.tail(condition_count(problem.rings));
         if (!found) compare.restart();
-        const double error = found ? compare(free_energy(problem, out.observed, out.length), elements, settings.degree)
+        const int power = std::min(2 * (settings.degree - (problem.bending.kg != 0 ? 2 : 1)), 8);
+        const double error = found ? compare(free_energy(problem, out.observed, out.length), elements, power)
                                    : std::numeric_limits<double>::infinity();
         // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);

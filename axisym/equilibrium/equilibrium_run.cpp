@@ -176,6 +176,8 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    if (c.energy.kg > 0 || c.equilibrium->branch.parameter == vary_kg)
+        table.add({{"energy_kg", [](const ShapeRow& r) { return r.o.energy_kg; }}});
     if (c.energy.alpha)
         table.add({{"energy_alpha", [](const ShapeRow& r) { return r.o.energy_alpha; }},
                    {"M", [](const ShapeRow& r) { return r.o.M; }}});

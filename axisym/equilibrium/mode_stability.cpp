@@ -83,6 +83,17 @@ J functional_density(const Bending& bending, const std::optional<Formula>& poten
 
 }  // namespace
 
+namespace {
+
+std::vector<double> third_derivatives(const SplineSpace& splines, int element, double s) {
+    double values[4 * SplineSpace::max_width];
+    splines.splines(element, s, 3, values);
+    const double* third = values + static_cast<std::ptrdiff_t>(3) * splines.width();
+    return {third, third + splines.width()};
+}
+
+}  // namespace
+
 // dW/dnu - H W: the derivative of INT W dS along the normal displacement w is the integral of this times w.
 double ModeStability::slope_along_normal(const Formula& W, double P, const Point& p) {
     using Slope = Jet<double, 2, 1>;
@@ -103,8 +114,9 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     };
     const Vector n_r = space.r().project([&](double s) { return normal(s)[0]; });
     const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
-    std::vector<std::array<double, 3>> first_variation;  // by w, w_s, w_ss
+    std::vector<std::array<double, 4>> first_variation;  // by w, w_s, w_ss, w_sss
     const Bending bending = with_M(problem.bending, shape.observed.M);
+    if (bending.kg != 0) gradients_.emplace();
     const std::optional<Formula> potential = potential_density(bending.potentials);
     if (problem.beads) beads_.emplace(bead_forms(space, problem));
     for (int e = 0; e < splines.elements(); ++e)
@@ -117,6 +129,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 r[0][q] = p.r, r[1][q] = p.r1, r[2][q] = p.r2, z[0][q] = p.z, z[1][q] = p.z1, z[2][q] = p.z2;
                 for (int k = 0; k < 3; ++k) nr[k][q] = u[k], nz[k][q] = v[k];
             }
+            if (gradients_) add_gradients(e, group, n_r, n_z);
             const J density = functional_density(bending, potential, beads_, shape, disturb(r, z, nr, nz));
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
@@ -134,15 +147,45 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                     p.bead[2 * bead] = slope_along_normal(beads_->equations().density(bead), P, p);
                     p.bead[2 * bead + 1] = slope_along_normal(beads_->equations().density_by_P(bead), P, p);
                 }
+                first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q], 0});
+                if (gradients_) {
+                    third_.push_back(third_derivatives(splines, e, b.z[q]));
+                    const auto& more = gradients_->first_variation(points_.size());
+                    for (int k = 0; k < 4; ++k) first_variation.back()[k] += bending.kg * more[k];
+                }
                 points_.push_back(p);
-                first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q]});
             }
         }
     set_force(first_variation);
 }
 
+// Those of the gradient term at a group of points, displaced along the field n.
+void ModeStability::add_gradients(int element, int group, const Vector& n_r, const Vector& n_z) {
+    const CurveSpace& space = *shape_.space;
+    const int width = space.splines().width();
+    const auto& b = space.splines().basis(element, group);
+    GradientModes::Derivatives r, z, along_r, along_z;
+    for (int q = 0; q < lanes; ++q) {
+        double values[4 * SplineSpace::max_width];
+        space.splines().splines(element, b.z[q], 3, values);
+        const auto derivative = [&](const SplineSpace& field, const double* c, int k) {
+            double sum = 0;
+            for (int a = 0; a < width; ++a)
+                sum += values[k * width + a] * field.signs(element)[a] * c[field.dofs(element)[a]];
+            return sum;
+        };
+        for (int k = 0; k < 4; ++k) {
+            const double rise = k == 0 ? b.z[q] : k == 1 ? 1 : 0;
+            r[k][q] = derivative(space.r(), shape_.x.data(), k);
+            z[k][q] = derivative(space.z(), shape_.x.data() + space.r().size(), k) + rise * space.rise(shape_.x.data());
+            along_r[k][q] = derivative(space.r(), n_r.data(), k), along_z[k][q] = derivative(space.z(), n_z.data(), k);
+        }
+    }
+    gradients_->add_group(r, z, along_r, along_z);
+}
+
 // (force, phi) = -first variation by phi, for all phi of a scalar field.
-void ModeStability::set_force(const std::vector<std::array<double, 3>>& first_variation) {
+void ModeStability::set_force(const std::vector<std::array<double, 4>>& first_variation) {
     const SplineSpace& splines = shape_.space->splines();
     const SplineSpace field(splines, Parity{});
     const int n = field.size(), width = splines.width(), per_element = splines.groups() * lanes;
@@ -157,6 +200,7 @@ void ModeStability::set_force(const std::vector<std::array<double, 3>>& first_va
             const int i = field.dofs(e)[a];
             const double sign = field.signs(e)[a], f0 = sign * b.by_spline[q][0][a];
             load[i] -= p.weight * (d[0] * f0 + sign * (d[1] * b.by_spline[q][1][a] + d[2] * b.by_spline[q][2][a]));
+            if (gradients_) load[i] -= p.weight * d[3] * sign * third_[k][a];
             for (int c = 0; c < width; ++c)
                 mass(field.dofs(e)[c], i) +=
                     p.weight * p.r * p.g * p.along * f0 * field.signs(e)[c] * b.by_spline[q][0][c];
@@ -300,7 +344,7 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
         const auto& b = field.basis(e, static_cast<int>(k) % per_element / lanes);
         const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
         const double dS = p.weight * p.r * p.g, n2 = p.along * p.along;
-        Eigen::Matrix3d C;
+        Eigen::Matrix4d C = Eigen::Matrix4d::Zero();
         C(0, 0) =
             Q(W, W) - 2 * m2 * Q(W, W_tt) + m2 * m2 * Q(W_tt, W_tt) + m2 * Q(W_t, W_t) - p.force * p.H * n2 * p.r * p.g;
         C(0, 1) = C(1, 0) = Q(W, W_s) - m2 * Q(W_s, W_tt) + m2 * Q(W_t, W_st);
@@ -308,14 +352,16 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
         C(1, 1) = Q(W_s, W_s) + m2 * Q(W_st, W_st);
         C(1, 2) = C(2, 1) = Q(W_s, W_ss);
         C(2, 2) = Q(W_ss, W_ss);
+        if (gradients_) C += problem_.bending.kg * gradients_->second_variation(k, m);
+        const auto third = [&](int a) { return gradients_ ? third_[k][a] : 0.0; };
         // Rigid motions as normal displacements over cos(m theta).
         const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, p.z * p.normal_r - p.r * p.normal_z};
         for (int a = 0; a < width; ++a) {
             const int i = field.dofs(e)[a];
             const double sign = field.signs(e)[a];
-            const Eigen::Vector3d v(sign * b.by_spline[q][0][a], sign * b.by_spline[q][1][a],
-                                    sign * b.by_spline[q][2][a]);
-            const Eigen::Vector3d Cv = p.weight * (C * v);
+            const Eigen::Vector4d v =
+                sign * Eigen::Vector4d(b.by_spline[q][0][a], b.by_spline[q][1][a], b.by_spline[q][2][a], third(a));
+            const Eigen::Vector4d Cv = p.weight * (C * v);
             forms.area[i] -= dS * p.H * p.along * v[0];
             forms.volume[i] += dS * p.along * v[0];
             forms.M[i] -= 2 * dS * p.kappa_s * p.kappa_theta * p.along * v[0];
@@ -326,7 +372,7 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
                 const int j = field.dofs(e)[c];
                 const double other = field.signs(e)[c], f0 = other * b.by_spline[q][0][c],
                              f1 = other * b.by_spline[q][1][c], f2 = other * b.by_spline[q][2][c];
-                forms.second_variation(j, i) += f0 * Cv[0] + f1 * Cv[1] + f2 * Cv[2];
+                forms.second_variation(j, i) += f0 * Cv[0] + f1 * Cv[1] + f2 * Cv[2] + other * third(c) * Cv[3];
                 forms.mass(j, i) += dS * n2 * f0 * v[0];
                 forms.gradients(j, i) += dS * (f1 * v[1] / (p.g * p.g) + m2 / (p.r * p.r) * f0 * v[0]);
                 forms.source(j, i) += dS * p.H * p.along * f0 * v[0];
@@ -337,16 +383,19 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
 }
 
 // A basis of the functions that begin with the power m of the distance at a pole. Parity does it for m = 0 and 1; of
-// the others the even ones must vanish, the odd ones be flat.
+// the others the even ones must vanish, the odd ones be flat. Where |grad H|^2 counts, the next power down is excluded,
+// too, by its second or third derivative: with it that has no integral.
 Matrix ModeStability::regular(int m, const SplineSpace& field) const {
     Matrix at_poles(field.size(), 0);
     const auto require = [&](int e, double s) {
-        double values[3 * SplineSpace::max_width];
-        field.splines(e, s, 2, values);
-        Vector functional = Vector::Zero(field.size());
-        for (int a = 0; a < field.width(); ++a)
-            functional[field.dofs(e)[a]] += field.signs(e)[a] * values[m % 2 * field.width() + a];
-        append(at_poles, functional.normalized());
+        double values[4 * SplineSpace::max_width];
+        field.splines(e, s, 3, values);
+        for (int derivative = m % 2; derivative < (gradients_ && m >= 4 ? 4 : 2); derivative += 2) {
+            Vector functional = Vector::Zero(field.size());
+            for (int a = 0; a < field.width(); ++a)
+                functional[field.dofs(e)[a]] += field.signs(e)[a] * values[derivative * field.width() + a];
+            append(at_poles, functional.normalized());
+        }
     };
     if (m >= 2 && shape_.space->begins_at_pole()) require(0, 0);
     if (m >= 2 && shape_.space->ends_at_pole()) require(field.elements() - 1, 1);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "axisym/equilibrium/equilibrium.hpp"
+#include "axisym/equilibrium/gradient_modes.hpp"
 #include "common/model/model.hpp"
 
 namespace tubule::axisym {
@@ -56,7 +57,8 @@ private:
     // Quadratic and linear forms of one m, per dtheta and over the curve alone, not its mirror image.
     struct Forms;
 
-    void set_force(const std::vector<std::array<double, 3>>& first_variation);
+    void add_gradients(int element, int group, const Eigen::VectorXd& n_r, const Eigen::VectorXd& n_z);
+    void set_force(const std::vector<std::array<double, 4>>& first_variation);
     std::vector<Parity> parities(int m) const;
     int mirror(Parity parity) const;
     Forms assemble(int m, const SplineSpace& field) const;
@@ -79,6 +81,8 @@ private:
     Equilibrium shape_;
     std::optional<BeadForms> beads_;
     std::vector<Point> points_;  // element by element
+    std::optional<GradientModes> gradients_;
+    std::vector<std::vector<double>> third_;  // of each point, third derivatives of the active splines, with gradients_
 };
 
 // For m = 0 ... last.

@@ -50,6 +50,10 @@ double SplineSpace::bernoulli_norm() const {
     return degree() == 3 ? 1.0 / 720 : degree() == 5 ? 1.0 / 1209600 : 691.0 / 2730 / 479001600;
 }
 
+double SplineSpace::bernoulli_norm_of_third() const {
+    return degree() == 3 ? 1.0 / 12 : degree() == 5 ? 1.0 / 30240 : 5.0 / 66 / 3628800;
+}
+
 double SplineSpace::Shared::knot(int index) const {
     const int n = static_cast<int>(breaks.size()) - 1, j = floor_div(index, multiplicity), L = cell.mirror ? 2 * n : n;
     if (cell.open_start && j < 0) return breaks.front();
@@ -105,7 +109,7 @@ SplineSpace::Active::Active(const Shared& splines, int first) : p(splines.degree
         double c[max_width] = {};
         c[a] = 1;
         for (int k = 0; k <= p; ++k) {
-            if (k <= 2) std::copy_n(c, max_width, combo[k][a]);
+            if (k <= 3) std::copy_n(c, max_width, combo[k][a]);
             if (k == p) top[a] = c[p];
             const int d = p - k;
             if (d > 0)
@@ -117,7 +121,7 @@ SplineSpace::Active::Active(const Shared& splines, int first) : p(splines.degree
 // T is a number, or a pack of points.
 template <class T>
 void SplineSpace::Active::operator()(const T& z, int derivatives, T* out) const {
-    T low[3][max_width];  // values of the splines of degree p - k, k = 0, 1, 2
+    T low[4][max_width];  // values of the splines of degree p - k
     T v[max_width + 1];
     std::fill_n(v, max_width + 1, T(0.0));
     v[p] = T(1.0);

@@ -65,6 +65,8 @@ public:
     // Squared norm |B_2n|/(2n)!, n = degree - 1, of the Bernoulli spline that is left of a polynomial of degree + 1
     // when its second derivative is approximated by splines of degree - 2; of degree 3, 5 or 7.
     double bernoulli_norm() const;
+    // Likewise of its third derivative by splines of degree - 3.
+    double bernoulli_norm_of_third() const;
     const Basis& basis(int element, int group) const { return shared_->basis[element * groups() + group]; }
     // The coefficient of each active spline of an element, and its sign: all +1 where the parity is even; 0 where a
     // spline is absent from an odd space (its dof is then 0).
@@ -78,7 +80,7 @@ public:
         return evaluate(coefficients, element_at(z), z);
     }
     double value(const double* coefficients, int element, double z) const;
-    // out[k * width() + a] = derivative k = 0 ... derivatives (at most 2) of the active spline a at z inside `element`.
+    // out[k * width() + a] = derivative k = 0 ... derivatives (at most 3) of the active spline a at z inside `element`.
     void splines(int element, double z, int derivatives, double* out) const;
     // The derivative of order `degree`, constant on each element; and that of each active spline.
     double top_derivative(const double* coefficients, int element) const;
@@ -131,12 +133,12 @@ private:
         int p;
         double knots[2 * max_width];                    // of the active splines
         double inverse_span[max_width][2 * max_width];  // [d][i] = 1 / (knots[i + d] - knots[i]), 0 for a repeated knot
-        double combo[3][max_width][max_width];          // derivative k of spline a in splines of degree p - k
+        double combo[4][max_width][max_width];          // derivative k of spline a in splines of degree p - k
         double top[max_width];                          // derivative p of spline a
 
         // The first active spline has the raw index `first`.
         Active(const Shared& splines, int first);
-        // out[k * (p + 1) + a] = derivative k = 0 ... derivatives (at most 2) of spline a at z.
+        // out[k * (p + 1) + a] = derivative k = 0 ... derivatives (at most 3) of spline a at z.
         template <class T>
         void operator()(const T& z, int derivatives, T* out) const;
     };

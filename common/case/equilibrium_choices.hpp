@@ -25,7 +25,7 @@ enum class Family { prolate, oblate, stomatocyte, pear };
 inline constexpr int vary_H0 = -1, vary_area = -2, vary_volume = -3, vary_reduced_volume = -4, vary_tension = -5,
                      vary_pressure = -6, vary_force = -7, vary_alpha = -8, vary_M0 = -9, vary_extension = -10,
                      vary_height = -11,  // of the second ring of a patch
-    vary_strength = -12;                 // of potential 0; of potential i, i less
+    vary_kg = -12, vary_strength = -13;  // of potential 0; of potential i, i less
 
 struct BranchChoices {
     std::optional<int> parameter;  // absent: one shape only
@@ -128,6 +128,7 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
         for (std::size_t i = 0; i < count_terms(energy); ++i)
             parameters.emplace_back(term_key(energy, i), static_cast<int>(i));
         parameters.insert(parameters.end(), {{"energy.H0", vary_H0},
+                                             {"energy.kg", vary_kg},
                                              {"energy.alpha", vary_alpha},
                                              {"energy.M0", vary_M0},
                                              {"equilibrium.area", vary_area},

@@ -122,6 +122,7 @@ void keys(Keys& k, Bending& energy, Tier tier) {
         k.number(term.key, energy.k[i]);
         moduli += (moduli.empty() ? "" : ", ") + std::string(term.key);
     });
+    k.number("kg", energy.kg, {.from = 0});
     k.number_or_formula("H0", energy.H0, energy.H0_formula, tier == Tier::surface3d ? H0_of_surface : H0_of_profile);
     k.number("alpha", energy.alpha, {.from = 0});
     k.number("M0", energy.M0);
@@ -359,6 +360,7 @@ inline std::optional<double> branch_begin(const Case& c) {
     if (parameter == vary_extension) return c.model.extension ? std::optional(c.model.extension->at(0)) : std::nullopt;
     if (parameter == vary_height) return std::nullopt;
     if (parameter == vary_alpha) return c.energy.alpha;
+    if (parameter == vary_kg) return c.energy.kg;
     if (parameter <= vary_strength) return c.energy.potentials[vary_strength - parameter].strength;
     if (parameter == vary_M0) return c.energy.M0;
     return parameter == vary_H0 ? c.energy.H0 : modulus(c.energy, parameter);

@@ -99,8 +99,8 @@ void merge_listed_terms(Bending& bending) {
 }
 
 bool symbol_may_vanish(const Bending& bending) {
-    return std::ranges::any_of(bending.k, [](double k) { return k < 0; }) ||
-           !std::ranges::all_of(bending.terms, is_square_or_flat);
+    return bending.kg == 0 && (std::ranges::any_of(bending.k, [](double k) { return k < 0; }) ||
+                               !std::ranges::all_of(bending.terms, is_square_or_flat));
 }
 
 std::string unbounded_below(const Bending& bending) {

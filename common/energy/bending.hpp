@@ -110,6 +110,7 @@ struct Bending {
     std::array<double, n_bending_terms> k{};
     double H0 = 0;
     std::vector<EnergyTerm> terms = {};
+    double kg = 0;                                   // of kg |grad H|^2 beside f, theory.md (2.25): >= 0
     std::shared_ptr<const Formula> H0_formula = {};  // of the place on the initial shape: see H0_variables.hpp
     // Area-difference elasticity, theory.md (2.19): alpha/2 (M - M0)^2 beside INT f dS, where M = INT H dS. Absent:
     // none.
@@ -179,7 +180,8 @@ private:
     std::optional<FormulaDomain> domain_;
 };
 
-// Whether the principal symbol, theory.md (2.14), may change its sign: not if it is a sum of squares.
+// Whether the principal symbol, theory.md (2.14), may change its sign and short waves then grow without end: not if it
+// is a sum of squares, nor with kg > 0.
 bool symbol_may_vanish(const Bending& bending);
 // Words if the density has no lower bound, so that a membrane may gain energy without end; else empty.
 std::string unbounded_below(const Bending& bending);

@@ -322,7 +322,7 @@ private:
             const double middle = (low * at_b - high * at_a) / (at_b - at_a);
             int iterations = 0;
             const auto place = advance(a, middle, iterations);
-            if (!place) return best;
+            if (!place) return best ? best : beside(a, middle, (high - low) / 100, f);
             best = {middle, *place};
             const double value = f(*place);
             if (std::abs(value) < tolerance * scale) break;
@@ -333,6 +333,20 @@ private:
             }
         }
         return best;
+    }
+
+    // A zero of f at which Newton's method fails, at this distance from a: interpolated between two places beside it.
+    template <class F>
+    std::optional<At> beside(const Place& a, double distance, double apart, const F& f) {
+        int iterations = 0;
+        const auto before = advance(a, distance - apart, iterations), after = advance(a, distance + apart, iterations);
+        if (!before || !after) return std::nullopt;
+        const double first = f(*before), last = f(*after);
+        if ((first < 0) == (last < 0)) return std::nullopt;
+        const double part = first / (first - last);
+        Place between = *before;
+        between.w += part * (after->w - before->w);
+        return At{distance + (2 * part - 1) * apart, std::move(between)};
     }
 
     // The place at a parameter between those of a and b: near it, then by Newton's method with the parameter held,

@@ -24,6 +24,8 @@ SetParameter setter(int parameter) {
     switch (parameter) {
         case vary_H0:
             return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
+        case vary_kg:
+            return [](StationaryProblem& p, double value) { p.bending.kg = value; };
         case vary_alpha:
             return [](StationaryProblem& p, double value) { p.bending.alpha = value; };
         case vary_M0:
@@ -59,6 +61,8 @@ double parameter_value(int parameter, const StationaryProblem& p) {
     switch (parameter) {
         case vary_H0:
             return p.bending.H0;
+        case vary_kg:
+            return p.bending.kg;
         case vary_alpha:
             return *p.bending.alpha;
         case vary_M0:

@@ -53,9 +53,9 @@ double reduced_volume(double area, double volume) {
 
 bool scale_free(const StationaryProblem& p) {
     return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
-           p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha && p.loads.tension == 0 &&
-           p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 && p.bending.potentials.empty() &&
-           !p.beads && p.rings.empty();
+           p.bending.kg == 0 && p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha &&
+           p.loads.tension == 0 && p.loads.pressure == 0 && !p.loads.of_volume && p.loads.force == 0 &&
+           p.bending.potentials.empty() && !p.beads && p.rings.empty();
 }
 
 void check_problem(const StationaryProblem& problem, double period) {

@@ -34,6 +34,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"energy", "energy", "bending energy E", SeriesUse::energy},
     {"energy_<kl>", "energy", "part of the term with modulus k<kl> in E", SeriesUse::energy},
     {"energy_formula", "energy", "part of the term given by a formula in E", SeriesUse::energy},
+    {"energy_kg", "energy", "part of the gradient term, kg INT (grad H)^2 dS, in E", SeriesUse::energy},
     {"energy_alpha", "energy", "part of area-difference elasticity, alpha/2 (M - M0)^2, in E", SeriesUse::energy},
     {"potential_energy", "energy", "part of the potentials of places in E", SeriesUse::energy},
     {"free_energy", "energy", "F = E + tension A - pressure V - force L", SeriesUse::energy},

@@ -38,8 +38,8 @@ double symbol_along(const UniformTube& tube) {
 double size_of_stiffness(const UniformTube& tube, double q, int m) {
     const double R = tube.radius, Y = q * q + (m * m + 1) / (R * R);
     const auto f = on(tube);
-    return Y * (Y * (std::abs(f.HH) + 2 * std::abs(f.HK) / R + std::abs(f.KK) / (R * R)) + std::abs(f.f) +
-                2 * std::abs(f.H) / R + std::abs(tube.tension));
+    return Y * (Y * (2 * tube.energy.kg * Y + std::abs(f.HH) + 2 * std::abs(f.HK) / R + std::abs(f.KK) / (R * R)) +
+                std::abs(f.f) + 2 * std::abs(f.H) / R + std::abs(tube.tension));
 }
 
 // A wave whose stiffness is rounding is neutral.
@@ -85,6 +85,24 @@ std::vector<Complex> cubic_roots(double c2, double c1, double c0) {
     }
     std::sort(roots.begin(), roots.end(), faster);
     return roots;
+}
+
+// Zeros y > 0 of c3 y^3 + c2 y^2 + c1 y + c0, ascending.
+std::vector<double> positive_roots(double c3, double c2, double c1, double c0) {
+    std::vector<Complex> roots;
+    if (c3 != 0) {
+        roots = cubic_roots(c2 / c3, c1 / c3, c0 / c3);
+    } else if (c2 != 0) {
+        const double sign = std::copysign(1.0, c2);
+        roots = quadratic_roots(sign * c2, sign * c1, sign * c0);
+    } else if (c1 != 0) {
+        roots = {-c0 / c1};
+    }
+    std::vector<double> out;
+    for (const Complex& y : roots)
+        if (y.imag() == 0 && y.real() > 0) out.push_back(y.real());
+    std::sort(out.begin(), out.end());
+    return out;
 }
 
 // The denominator of theory.md (5.10): what resists without inertia, over Q R^2.
@@ -171,15 +189,21 @@ double reduced_tension(const UniformTube& tube) {
 Stiffness stiffness(const UniformTube& tube, int m) {
     const double R = tube.radius, z0 = (m * m - 1) / (R * R);  // Z = q^2 + z0
     const auto f = on(tube);
-    return {symbol_along(tube), 2 * f.HH * z0 + pull(tube) - 2 * f.H / R - 2 * f.HK * z0 / R,
-            f.HH * z0 * z0 + pull(tube) * z0};
+    // 2 kg Q Z^2 of the gradient term, Q = q^2 + around
+    const double kg = 2 * tube.energy.kg, around = m * m / (R * R);
+    return {kg, symbol_along(tube) + kg * (2 * z0 + around),
+            2 * f.HH * z0 + pull(tube) - 2 * f.H / R - 2 * f.HK * z0 / R + kg * z0 * (z0 + 2 * around),
+            f.HH * z0 * z0 + pull(tube) * z0 + kg * around * z0 * z0};
 }
 
 double stiffness(const UniformSphere& sphere, int l) {
     const double R = sphere.radius, L = l * (l + 1.0) - 2;
     const auto f = on(sphere);
     const double as_a_whole = l == 0 ? 16 * pi * sphere.energy.alpha.value_or(0) / (R * R) : 0;  // theory.md (2.21)
-    return L / (R * R) * (L / (R * R) * (f.HH - 2 * f.HK / R + f.KK / (R * R)) + f.f - f.K / (R * R) + sphere.tension) +
+    const double gradients = 2 * sphere.energy.kg * l * (l + 1.0) / (R * R);                     // theory.md (6.11)
+    return L / (R * R) *
+               (L / (R * R) * (f.HH - 2 * f.HK / R + f.KK / (R * R) + gradients) + f.f - f.K / (R * R) +
+                sphere.tension) +
            as_a_whole;
 }
 
@@ -221,24 +245,16 @@ double toroidal_rate(const UniformSphere& sphere, const MotionLaw& law, int l) {
 }
 
 bool ill_posed_along(const UniformTube& tube) {
-    return !(symbol_along(tube) > 0);
+    return tube.energy.kg == 0 && !(symbol_along(tube) > 0);
 }
 bool ill_posed_around(const UniformTube& tube) {
-    return !(on(tube).HH > 0);
+    return tube.energy.kg == 0 && !(on(tube).HH > 0);
 }
 
 std::vector<Band> growing_bands(const UniformTube& tube, int m) {
     const Stiffness G = stiffness(tube, m);
     // The zeros of G in y = q^2 > 0 at which it changes sign.
-    std::vector<double> changes;
-    if (G.q4 != 0) {
-        const double sign = std::copysign(1.0, G.q4);
-        for (const Complex& y : quadratic_roots(sign * G.q4, sign * G.q2, sign * G.q0))
-            if (y.imag() == 0 && y.real() > 0) changes.push_back(y.real());
-    } else if (G.q2 != 0 && -G.q0 / G.q2 > 0) {
-        changes.push_back(-G.q0 / G.q2);
-    }
-    std::sort(changes.begin(), changes.end());
+    std::vector<double> changes = positive_roots(G.q6, G.q4, G.q2, G.q0);
     changes.insert(changes.begin(), 0.0);
     std::vector<Band> bands;
     for (std::size_t i = 0; i < changes.size(); ++i) {
@@ -296,32 +312,30 @@ std::optional<FittingWave> fastest_fitting_wave(const UniformTube& tube, const M
     return best;
 }
 
-// With y = q^2 and T = f + F1/R + sigma0 the stiffness is q4 y^2 + (b + T) y + F2 z0^2 + T z0. None is negative if the
-// value at y = 0 is not, and either b + T >= 0 or (b + T)^2 <= 4 q4 (F2 z0^2 + T z0): an interval of T.
+// With y = q^2 and T = f + F1/R + sigma0 the stiffness is P(y) + T (y + z0), z0 = (m^2 - 1)/R^2. It is negative nowhere
+// if T >= -P/(y + z0) for all y > -z0 and T <= -P/(y + z0) for all y < -z0: the extremes of that ratio bound T, and
+// where P vanishes at -z0 so does its limit there.
 std::optional<StableTensions> stable_tensions(const UniformTube& tube, int m) {
+    constexpr double rounding = 2e-15;
     if (ill_posed_along(tube)) return std::nullopt;
-    const double T = pull(tube), z0 = (m * m - 1) / (tube.radius * tube.radius), F2 = on(tube).HH;
-    const Stiffness G = stiffness(tube, m);
-    const double b = G.q2 - T, at_rest = F2 * z0 * z0;
+    const double T = pull(tube), z0 = (m * m - 1) / (tube.radius * tube.radius);
+    Stiffness P = stiffness(tube, m);
+    P.q2 -= T, P.q0 -= T * z0;
+    const auto slope = [&](double y) { return (3 * P.q6 * y + 2 * P.q4) * y + P.q2; };
+    const auto value = [&](double y) { return ((P.q6 * y + P.q4) * y + P.q2) * y + P.q0; };
     StableTensions out;
-    if (m == 1) {
-        out.lowest = -b;
-    } else {
-        const double long_waves = -F2 * z0;  // T at which q = 0 is neutral: an upper bound for m = 0, else a lower one
-        // T^2 + 2 half T + rest <= 0 where waves of some q > 0 are neutral at most.
-        const double half = b - 2 * G.q4 * z0, rest = b * b - 4 * G.q4 * at_rest, square = half * half - rest;
-        const auto neutral = [&](double T) { return std::sqrt(std::max(-(b + T) / (2 * G.q4), 0.0)); };
-        if (m == 0 && square < 0) return std::nullopt;
-        const double root = std::sqrt(std::max(square, 0.0)), first = -half - root, second = -half + root;
-        if (m == 0) {
-            out.lowest = first, out.q_lowest = neutral(first);
-            out.highest = long_waves;
-            if (-b > long_waves) out.highest = second, out.q_highest = neutral(second);
-        } else if (-b > long_waves) {
-            out.lowest = first, out.q_lowest = neutral(first);
-        } else {
-            out.lowest = long_waves;
-        }
+    const auto bound = [&](double y, double ratio, bool below, bool above) {
+        if (below && ratio > out.lowest) out.lowest = ratio, out.q_lowest = std::sqrt(y);
+        if (above && ratio < out.highest) out.highest = ratio, out.q_highest = std::sqrt(y);
+    };
+    std::vector<double> places = positive_roots(2 * P.q6, P.q4 + 3 * P.q6 * z0, 2 * P.q4 * z0, P.q2 * z0 - P.q0);
+    places.push_back(0);
+    for (const double y : places)
+        if (std::abs(y + z0) > 1e-12 * std::abs(z0)) bound(y, -value(y) / (y + z0), y + z0 > 0, y + z0 < 0);
+    if (m < 2) {
+        const double size = ((std::abs(P.q6 * z0) + std::abs(P.q4)) * std::abs(z0) + std::abs(P.q2)) * std::abs(z0);
+        if (value(-z0) < -rounding * size) return std::nullopt;
+        if (value(-z0) <= rounding * size) bound(-z0, -slope(-z0), true, m == 0);
     }
     out.lowest += tube.tension - T, out.highest += tube.tension - T;
     return out;
@@ -339,11 +353,16 @@ std::optional<StableTensions> common_stable_tensions(const UniformTube& tube, in
     return all;
 }
 
+// f_KK adds y^2/R^2 to G for each unit, y = q^2.
 std::optional<double> least_f_KK(const UniformTube& tube) {
     const Stiffness G = stiffness(tube, 0);
     if (G.q0 < 0 || (G.q0 == 0 && G.q2 < 0)) return std::nullopt;
-    const double least_q4 = G.q2 < 0 ? G.q2 * G.q2 / (4 * G.q0) : 0, R = tube.radius;
-    return on(tube).KK + (least_q4 - G.q4) * R * R;
+    const double R = tube.radius;
+    double missing = -G.q4;  // of the shortest waves; with q6 > 0 they need nothing
+    if (G.q6 > 0) missing = -infinity;
+    for (const double y : positive_roots(G.q6, 0, -G.q2, -2 * G.q0))
+        missing = std::max(missing, -(G.q6 * y + G.q4 + (G.q2 + G.q0 / y) / y));
+    return on(tube).KK + missing * R * R;
 }
 
 }  // namespace tubule::theory

@@ -53,11 +53,12 @@ std::optional<double> radius_at_rest(const MotionLaw& law, const UniformTube& tu
 // Sigma of theory.md (5.20): (f + f_H/R + sigma0) R^2/f_HH. Not finite where f_HH = 0.
 double reduced_tension(const UniformTube& tube);
 
-// G of theory.md (5.8) as a polynomial of q: the gradient flow's -omega, and what drives the other models. A wave grows
-// where G < 0.
+// G of theory.md (5.8), with the gradient term (5.28), as a polynomial of q: the gradient flow's -omega, and what
+// drives the other models. A wave grows where G < 0.
 struct Stiffness {
-    double q4 = 0, q2 = 0, q0 = 0;
-    double operator()(double q) const { return (q4 * q * q + q2) * q * q + q0; }
+    double q6 = 0, q4 = 0, q2 = 0, q0 = 0;
+    double operator()(double q) const { return ((q6 * q * q + q4) * q * q + q2) * q * q + q0; }
+    bool rises() const { return q6 > 0 || (q6 == 0 && q4 > 0); }  // with q, in the end
 };
 Stiffness stiffness(const UniformTube& tube, int m);
 double stiffness(const UniformSphere& sphere, int l);
@@ -77,12 +78,12 @@ double toroidal_rate(const UniformSphere& sphere, const MotionLaw& law, int l);
 // M of theory.md (5.16), (5.18): laws without inertia move as a' = -M G a. With inertia, of a''.
 double mobility(const UniformTube& tube, const MotionLaw& law, double q, int m);
 
-// Where the principal symbol f_HH + 2 f_HK x + f_KK x^2 is not positive, waves grow the faster the shorter they are:
-// waves along the axis (x = -1/R), or around it (x = 0).
+// Where the principal symbol f_HH + 2 f_HK x + f_KK x^2 is not positive and kg = 0, waves grow the faster the shorter
+// they are: waves along the axis (x = -1/R), or around it (x = 0).
 bool ill_posed_along(const UniformTube& tube);
 bool ill_posed_around(const UniformTube& tube);
 
-// Wave numbers of one m that grow, q >= 0: none, one band, or two if ill-posed. The same for all models.
+// Wave numbers of one m that grow, q >= 0: none, one band, or two if ill-posed or with kg > 0. The same for all models.
 struct Band {
     double from = 0, to = std::numeric_limits<double>::infinity();
 };

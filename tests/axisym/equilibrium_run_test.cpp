@@ -103,7 +103,7 @@ TEST(EquilibriumCase, refusals) {
            "14:1: equilibrium.branch varies what the energy does not have: see energy.alpha");
     expect("energy.k42", "energy.k43",
            "15:8: equilibrium.branch.vary must be one of \"energy.k20\", \"energy.k40\", \"energy.k42\", "
-           "\"energy.H0\", \"energy.alpha\", \"energy.M0\", \"equilibrium.area\", \"equilibrium.volume\", "
+           "\"energy.H0\", \"energy.kg\", \"energy.alpha\", \"energy.M0\", \"equilibrium.area\", \"equilibrium.volume\", "
            "\"equilibrium.reduced_volume\", "
            "\"model.tension\", \"model.pressure\", \"model.force\", \"model.extension\", \"shape.height\", not "
            "\"energy.k43\"; did you "

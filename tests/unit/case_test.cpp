@@ -435,8 +435,9 @@ TEST(TierAuto, RefusesWhatBelongsElsewhere) {
     EXPECT_EQ(refused("auto.modes=0"), "--set auto.modes=0: auto.modes must be an integer >= 1 and <= 20, not 0");
     EXPECT_EQ(refused("auto.mods=3"),
               "--set auto.mods=3: unknown key auto.mods; did you mean 'modes'? Allowed here: noise, largest, modes");
-    EXPECT_EQ(refused("equilibrium.modes=2"),
-              "--set equilibrium.modes=2: equilibrium must be absent: only valid with tier = \"axisym\" or \"surface3d\"");
+    EXPECT_EQ(
+        refused("equilibrium.modes=2"),
+        "--set equilibrium.modes=2: equilibrium must be absent: only valid with tier = \"axisym\" or \"surface3d\"");
     EXPECT_EQ(refused("discretisation.parametrisation=even").substr(0, 92),
               "--set discretisation.parametrisation=even: unknown key discretisation.parametrisation: only ");
     EXPECT_EQ(refused("discretisation.scheme=paper"),
@@ -457,7 +458,7 @@ TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
         effective_toml(c),
         "tier = \"axisym\"\n"
         "\n[about]\ntitle = \"test\"\n"
-        "\n[energy]\nk20 = 1\nk40 = 0\nk42 = 0.06\nH0 = -2\n"
+        "\n[energy]\nk20 = 1\nk40 = 0\nk42 = 0.06\nkg = 0\nH0 = -2\n"
         "\n[model]\nkind = \"gradient-flow\"\nvolume = \"free\"\narea = \"free\"\nperiod = \"fixed\"\ntension = "
         "0\npressure = 0\n"
         "\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n"
@@ -521,15 +522,16 @@ TEST(Tube, RadiusIsDifferentiable) {
 }
 
 TEST(CaseErrors, allAreReportedAtOnce) {
-    EXPECT_EQ(refusal(with("radius", "raduis"), {"energy.k43=1", "accuracy.energy=often", "time.end=-1"}),
-              "--set energy.k43=1: unknown key energy.k43; did you mean 'k40'? Allowed here: k20, k40, k42, H0, alpha, "
-              "M0, term, potential\n"
-              "case.toml:11:1: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, length, "
-              "mode, noise "
-              "(with --set energy.k43=1 --set accuracy.energy=often --set time.end=-1)\n"
-              "--set accuracy.energy=often: accuracy.energy must be a number > 1e-12 and <= 0.1, not the string "
-              "\"often\"\n"
-              "--set time.end=-1: time.end must be a number > 0, not -1");
+    EXPECT_EQ(
+        refusal(with("radius", "raduis"), {"energy.k43=1", "accuracy.energy=often", "time.end=-1"}),
+        "--set energy.k43=1: unknown key energy.k43; did you mean 'k40'? Allowed here: k20, k40, k42, kg, H0, alpha, "
+        "M0, term, potential\n"
+        "case.toml:11:1: unknown key shape.raduis; did you mean 'radius'? Allowed here: kind, radius, length, "
+        "mode, noise "
+        "(with --set energy.k43=1 --set accuracy.energy=often --set time.end=-1)\n"
+        "--set accuracy.energy=often: accuracy.energy must be a number > 1e-12 and <= 0.1, not the string "
+        "\"often\"\n"
+        "--set time.end=-1: time.end must be a number > 0, not -1");
 }
 
 TEST(CaseRanges, OutputTimesEvenlySpaced) {

@@ -205,7 +205,8 @@ void add_mean_squares(double kT, const TubeSubject& subject, int last, ModelRepo
         refuse_motion(fmt::format("the radius changes at the rate {:.6g}", rate));
     const auto of_wave = [&](double q, int m, const std::string& name) {
         const theory::Stiffness G = stiffness(tube, m);
-        const double scale = (std::abs(G.q4) * q * q + std::abs(G.q2)) * q * q + std::abs(G.q0);
+        const double scale =
+            ((std::abs(G.q6) * q * q + std::abs(G.q4)) * q * q + std::abs(G.q2)) * q * q + std::abs(G.q0);
         return mean_square(kT, G(q), scale, 2 * pi * tube.radius * subject.length, name);
     };
     if (law.area_is_free() && !law.keeps_volume) of_wave(0, 0, "a change of the radius");
@@ -253,6 +254,7 @@ std::string moduli(const Bending& energy) {
     for (const EnergyTerm& term : energy.terms)
         text += term.formula ? fmt::format("{:g} ({}), ", term.modulus, term.formula->text)
                              : fmt::format("k{} = {:g}, ", term_name(term), term.modulus);
+    if (energy.kg != 0) text += fmt::format("kg = {:g}, ", energy.kg);
     text += fmt::format("H0 = {:g}", energy.H0);
     return energy.alpha ? text + fmt::format(", alpha = {:g}, M0 = {:g}", *energy.alpha, energy.M0) : text;
 }

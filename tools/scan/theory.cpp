@@ -88,9 +88,12 @@ std::optional<double> driven_most(const Problem& c, int m) {
     if (!tube) return std::nullopt;
     const auto& shape = std::get<Tube>(c.shape);
     const theory::Stiffness G = theory::stiffness(*tube, m);
-    if (!(G.q4 > 0)) return std::nullopt;  // ill-posed: there is no such wave
+    if (!G.rises()) return std::nullopt;  // ill-posed: there is no such wave
     const double longest = 2 * std::numbers::pi * (m == 0 ? std::max(repeats(shape), 1) : 1) / shape.length;
-    const double lowest = std::sqrt(std::max(-G.q2 / (2 * G.q4), 0.0)) / longest;  // G is a parabola in q^2
+    // Where dG/d(q^2) = 3 q6 q^4 + 2 q4 q^2 + q2 vanishes last.
+    const double root = std::sqrt(std::max(G.q4 * G.q4 - 3 * G.q6 * G.q2, 0.0));
+    const double square = G.q4 + root > 0 ? -G.q2 / (G.q4 + root) : (root - G.q4) / (3 * G.q6);
+    const double lowest = std::sqrt(std::max(square, 0.0)) / longest;
     const double first = m < 2 ? 1 : 0;  // n = 0: another radius, or the whole tube moves
     double most = -G(first * longest);
     for (const double n : {std::floor(lowest), std::ceil(lowest)})

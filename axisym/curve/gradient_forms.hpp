@@ -1,0 +1,49 @@
+// The gradient term of a profile curve, G = INT |grad H|^2 dS, theory.md (2.25), and its derivatives in the
+// coefficients of the curve, to be added to those of CurveForms. Its curves have continuous curvature: splines of
+// smoothness 2 at least, whose third derivatives it needs.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "axisym/splines/curve_space.hpp"
+
+namespace tubule::axisym {
+
+class GradientForms {
+public:
+    // Keeps the space, which must outlive it. Throws std::invalid_argument where its smoothness is 1.
+    explicit GradientForms(const CurveSpace& space);
+
+    // Of the whole cell or period. `stiffness`, if given, receives 2 INT dS/g^6 for each element, by which an error of
+    // the third derivative along the normal counts.
+    double value(const double* x, std::vector<double>* stiffness = nullptr) const;
+    // The gradient, added to space.size() numbers.
+    void add_gradient(double weight, const double* x, double* out) const;
+    // The Hessian but for a free rise, added to the values of a matrix; `slots` are the places of each element's local
+    // matrix, as in CurveForms.
+    void add_hessian(double weight, const double* x, const std::vector<int>& slots, double* values) const;
+    // The second derivatives with one in the rise: add(number of the other coefficient, value).
+    template <class Add>
+    void each_by_rise(double weight, const double* x, const Add& add) const {
+        const Eigen::VectorXd row = by_rise(weight, x);
+        for (Eigen::Index i = 0; i < row.size(); ++i) add(static_cast<int>(i), row[i]);
+    }
+    // The derivative along the displacement z e_z, as CurveForms::stretch_slope().
+    double stretch_slope(const double* x) const;
+
+private:
+    struct Third {  // third derivatives of the active splines at a group of points, as in SplineSpace::Basis
+        alignas(32) double by_point[SplineSpace::max_width][SplineSpace::lanes];
+        alignas(32) double by_spline[SplineSpace::lanes][SplineSpace::max_width];
+    };
+    struct Local;
+    Eigen::VectorXd by_rise(double weight, const double* x) const;
+    template <class Visit>
+    void each_group(const double* x, const Visit& visit) const;
+
+    const CurveSpace& space_;
+    std::vector<Third> third_;
+};
+
+}  // namespace tubule::axisym
