@@ -156,20 +156,6 @@ void require_patch(const Problem& c, const Curve& shape) {
            "must leave the area or the volume free: of a part of a sphere or a cylinder they are one condition");
 }
 
-void require_gradients(const Problem& c, const Curve& shape) {
-    if (c.energy.kg == 0) return;
-    if (c.discretisation.smoothness == 1)
-        throw complaint(c, "discretisation.smoothness",
-                        "must be at least 2 where energy.kg is: curvature is continuous");
-    const std::optional<double> jump = jump_of_curvature(shape);
-    if (!jump) return;
-    const auto at = shape.at(*jump);
-    throw complaint(c, "energy.kg",
-                    fmt::format("must be 0 where the curvature of the initial shape jumps, here at r = {:.4g}, z = "
-                                "{:.4g}: |grad H|^2 has no integral there; begin with a smooth shape",
-                                at[0], at[2]));
-}
-
 InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
@@ -182,7 +168,6 @@ InitialShape initial_shape(const Problem& c) {
     }
     require_patch(c, whole);
     require_place(c, whole);
-    require_gradients(c, whole);
     const auto [area, volume] = area_and_volume(whole);
     const double length = c.law.beads ? bead_distance(c, whole) : whole.length;
     const auto* file = std::get_if<ProfileFile>(&c.shape);

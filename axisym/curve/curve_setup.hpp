@@ -32,8 +32,6 @@ InitialShape initial_shape(const Problem& c);
 double bead_distance(const Problem& c, const Curve& shape);
 // CaseError where a case asks of a patch what it has not.
 void require_patch(const Problem& c, const Curve& shape);
-// CaseError where a run with the gradient term cannot begin: at jumps of curvature, or with splines of smoothness 1.
-void require_gradients(const Problem& c, const Curve& shape);
 // CaseError where the potentials of places of a case do not suit this shape.
 void require_place(const Problem& c, const Curve& shape);
 

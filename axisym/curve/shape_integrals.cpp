@@ -110,24 +110,6 @@ std::array<double, 2> area_and_volume(const Curve& m) {
     return {m.images() * area, m.images() * volume};
 }
 
-std::optional<double> jump_of_curvature(const Curve& m) {
-    constexpr double h = 1e-4, jump = 1e-3;  // of the parameter; relative to the largest curvature beside a seam
-    // The curvature of the profile at t, from one side.
-    const auto curvature = [&](double t, double side) {
-        const auto a = m.at(t), b = m.at(t + side * h), c = m.at(t + 2 * side * h);
-        const auto slope = [&](int k) { return side * (4 * b[k] - 3 * a[k] - c[k]) / (2 * h); };
-        return profile_point(a[0], a[1], slope(1), a[3], slope(3)).kappa_s;
-    };
-    const auto jumps = [&](double before, double after) {
-        const double left = curvature(before, -1), right = curvature(after, 1);
-        return std::abs(left - right) > jump * std::max(std::abs(left), std::abs(right));
-    };
-    for (const double seam : m.seams)
-        if (jumps(seam, seam)) return seam;
-    if (m.topology == Topology::tube && jumps(1, 0)) return 0;
-    return std::nullopt;
-}
-
 ShapeEnergy bending_energy(const Curve& m, const Bending& bending) {
     constexpr int first = 32, most = 1024;
     constexpr double enough = 1e-11;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <vector>
 
 #include "common/energy/bending.hpp"
@@ -25,8 +24,5 @@ double patch_scale(const Bending& bending, double radius);
 // To about 1e-10 of the magnitude, if the meridian is smooth between its seams. Not finite where the energy is not
 // defined on the shape.
 ShapeEnergy bending_energy(const Curve& meridian, const Bending& bending);
-
-// Where the curvature of a curve jumps, so that |grad H|^2 has no integral: its parameter. Empty if nowhere.
-std::optional<double> jump_of_curvature(const Curve& meridian);
 
 }  // namespace tubule::axisym

@@ -75,6 +75,7 @@ constexpr Scheme default_scheme(bool inertia) {
 
 // The modulus of the first term in use that the paper's scheme has no force for; "" if there is none.
 inline std::string term_beyond_paper(const Bending& energy) {
+    if (energy.kg != 0) return "energy.kg";
     for (std::size_t i = 0; i < count_terms(energy); ++i) {
         const std::string key = term_key(energy, i);
         const bool known = key == "energy.k20" || key == "energy.k40" || key == "energy.k42";

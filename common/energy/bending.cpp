@@ -19,7 +19,8 @@ bool is_square_or_flat(const EnergyTerm& term) {
 }
 
 // The lowest density of surfaces whose principal curvatures are of this size, and where, as an angle in their plane.
-// The multiples of K are left out: their integral is the same for all shapes.
+// The multiples of K are left out: their integral is the same for all shapes. With a gradient term only straight tubes
+// and spheres count, where it vanishes.
 std::pair<double, double> lowest(Bending bending, double size) {
     std::erase_if(bending.terms, [](const EnergyTerm& t) { return !t.formula && t.H == 0 && t.K == 1; });
     constexpr int angles = 720;  // cylinders, saddles and spheres among them
@@ -27,6 +28,8 @@ std::pair<double, double> lowest(Bending bending, double size) {
     for (int i = 0; i < angles; ++i) {
         const double angle = 2 * std::numbers::pi * i / angles;
         const bool along_axis = i % (angles / 4) == 0, saddle = i % (angles / 4) == angles / 8 && i / (angles / 4) % 2;
+        const bool sphere = i % (angles / 4) == angles / 8 && !saddle;
+        if (bending.kg != 0 && !along_axis && !sphere) continue;
         const double a = size * std::cos(angle), b = size * std::sin(angle);
         const double f = density(bending, saddle ? 0 : a + b, along_axis ? 0 : a * b).f;
         const double terms = magnitude(bending, saddle ? 0 : a + b, along_axis ? 0 : a * b);
@@ -108,6 +111,11 @@ std::string unbounded_below(const Bending& bending) {
     const double before = lowest(bending, large).first;
     const auto [after, angle] = lowest(bending, larger);
     if (!(after < 0) || !(after < before - falls * std::abs(before))) return {};
+    if (bending.kg != 0)
+        return fmt::format(
+            "the energy has no lower bound: that of {} falls without end, as grad H = 0 there whatever energy.kg is",
+            std::abs(std::abs(std::cos(angle)) - std::abs(std::sin(angle))) < 0.1 ? "ever smaller spheres"
+                                                                                  : "ever thinner straight tubes");
     const double larger_one = std::max(std::abs(std::cos(angle)), std::abs(std::sin(angle)));
     return fmt::format(
         "the energy density f(H,K) has no lower bound: it falls without end as the principal curvatures grow like "

@@ -12,7 +12,7 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
                     const Bending& bending, const Eigen::VectorXd& H0) {
     // Summed up cell by cell, so that the answer does not depend on the number of threads.
     const int terms = static_cast<int>(count_terms(bending));
-    Eigen::MatrixXd of_cell(terms + 9, space.cells());
+    Eigen::MatrixXd of_cell(terms + 10, space.cells());
     const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     const Tabulation& table = space.tabulation();
     space.for_each_cell([&](int cell) {
@@ -30,16 +30,18 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
             // The flux of (x, y, 0)/2, which also holds for a period of a tube.
             const double flux = p.x.head<2>().dot(p.normal.head<2>()) / 2;
             const PointPotential of_place(W, p.x);
-            const Eigen::Matrix<double, 9, 1> others{1,
-                                                     flux,
-                                                     h * h,
-                                                     k,
-                                                     magnitude(bending, h0, h, k),
-                                                     h,
-                                                     of_place.value,
-                                                     -of_place.slope[2],
-                                                     std::abs(of_place.value)};
-            sum.template tail<9>() += dS * others;
+            const double slope = bending.kg != 0 ? (gradients(p, table, q) * H).norm() : 0;
+            const Eigen::Matrix<double, 10, 1> others{1,
+                                                      flux,
+                                                      h * h,
+                                                      k,
+                                                      magnitude(bending, h0, h, k),
+                                                      h,
+                                                      of_place.value,
+                                                      -of_place.slope[2],
+                                                      std::abs(of_place.value),
+                                                      bending.kg * slope * slope};
+            sum.template tail<10>() += dS * others;
         }
     });
     const Eigen::VectorXd total = of_cell.rowwise().sum();
@@ -48,7 +50,9 @@ Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const Cur
     o.energy = o.energy_alpha = area_difference_energy(bending, o.M);
     for (int i = 0; i < terms; ++i) o.energy += o.energy_term.emplace_back(total[i]);
     o.area = total[terms], o.volume = total[terms + 1], o.integral_H2 = total[terms + 2];
-    o.integral_K = total[terms + 3], o.magnitude = total[terms + 4] + o.energy_alpha + total[terms + 8];
+    o.energy_kg = total[terms + 9], o.energy += o.energy_kg;
+    o.integral_K = total[terms + 3];
+    o.magnitude = total[terms + 4] + o.energy_kg + o.energy_alpha + total[terms + 8];
     o.potential = total[terms + 6], o.potential_force = total[terms + 7], o.energy += o.potential;
     return o;
 }

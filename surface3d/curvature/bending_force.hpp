@@ -14,12 +14,13 @@ struct Observables {
     double energy = 0, area = 0, volume = 0;
     double M = 0, integral_H2 = 0, integral_K = 0;  // M = INT H
     double potential = 0, potential_force = 0;      // INT W, part of the energy, and -INT W_z
+    double energy_kg = 0;                           // of the gradient term, theory.md (2.25), part of the energy
     double energy_alpha = 0;                        // of area differences, theory.md (2.19), part of the energy
     double magnitude = 0;  // INT SUM |k| magnitude(H, K), see BendingTerm: E_ref is at least this
 };
 
-// The energy is INT f(H, K) + W dS + alpha/2 (M - M0)^2, W of potentials of places, with the recovered fields H, K;
-// `H0` at the nodes, where it varies.
+// The energy is INT f(H, K) + kg |grad H|^2 + W dS + alpha/2 (M - M0)^2, W of potentials, with the recovered fields H,
+// K; `H0` at the nodes, where it varies.
 Observables observe(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
                     const Bending& bending, const Eigen::VectorXd& H0 = {});
 
@@ -37,7 +38,7 @@ inline constexpr double willmore_bound = 16 * 3.14159265358979323846;
 // with the recovered normal and curvatures, and grad w = SUM nu_d grad v_d - B v. It belongs to the energy of the
 // smooth surface: it is not the derivative of observe().energy, which a change of curvature reaches through the
 // recovery, but the two approach each other at the order of the recovered gradients or better (docs/curvature.md).
-// Where areas differ, of an energy with_M().
+// Where areas differ, of an energy with_M(). Without the gradient term.
 VectorField bending_force(const SurfaceSpace& space, const CurvedMesh& mesh, const CurvatureField& curvature,
                           const Bending& bending);
 

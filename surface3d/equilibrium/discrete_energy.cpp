@@ -228,6 +228,9 @@ struct DiscreteEnergy::Block {
 };
 
 DiscreteEnergy::DiscreteEnergy(const CurvedMesh& mesh, const Bending& bending) : space_(mesh) {
+    if (bending.kg != 0)
+        throw std::invalid_argument(
+            "equilibria and rates of tier surface3d have no gradient term: energy.kg must be 0");
     for (int side = 0; side < 3; ++side) {
         left_.push_back(side_table(mesh.order, side, false));
         right_.push_back(side_table(mesh.order, side, true));

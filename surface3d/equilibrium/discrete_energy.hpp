@@ -46,7 +46,7 @@ struct EnergyDerivatives {
 class DiscreteEnergy {
 public:
     // The triangles of the mesh. The penalty belongs to this energy and to these positions; it stays until
-    // set_penalty() is called again.
+    // set_penalty() is called again. Throws std::invalid_argument where there is a gradient term.
     DiscreteEnergy(const CurvedMesh& mesh, const Bending& bending);
     void set_penalty(const CurvedMesh& mesh, const Bending& bending);
 

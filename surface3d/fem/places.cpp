@@ -146,6 +146,14 @@ Coarseness wall_coarseness(const CurvedMesh& mesh, std::span<const Potential> po
     });
 }
 
+Coarseness coarseness(const CurvedMesh& mesh, const Eigen::VectorXd& scale) {
+    return coarsest_of(mesh, [&](int cell, double) {
+        double shortest = HUGE_VAL;
+        for (int a = 0; a < mesh.nodes_per_cell(); ++a) shortest = std::min(shortest, scale[mesh.node(cell, a)]);
+        return shortest;
+    });
+}
+
 int triangles_for_places(std::span<const Potential> potentials, const std::optional<Beads>& beads, double area) {
     double shortest = beads ? beads->width : HUGE_VAL;
     for (const Potential& p : potentials)

@@ -49,6 +49,8 @@ struct Coarseness {
 constexpr double coarsest_place = 0.6;
 Coarseness bead_coarseness(const CurvedMesh& mesh, const BeadNumbers& at, double width);
 Coarseness wall_coarseness(const CurvedMesh& mesh, std::span<const Potential> potentials);
+// Likewise over a scale that is given at the nodes.
+Coarseness coarseness(const CurvedMesh& mesh, const Eigen::VectorXd& scale);
 
 // Whether the weight of a bead of this width with its pole at z is more than rounding there.
 inline bool is_in_reach(const Eigen::Vector3d& x, double z, double width) {

@@ -34,8 +34,16 @@ double axial_force(const MovingSurface& surface, const MotionState& state, const
             const Eigen::Vector3d along = e * s.along;
             const CurvatureJet<double> f = density_at(bending, H0.value, H, K);
             const double strain = along.dot(U * (grad.transpose() * along)) + state.stretch * s.area * s.area;
-            sum += table.weight[q] * x.area *
-                   (f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + 2 * law.viscosity * strain);
+            double of_gradients = 0;
+            if (bending.kg != 0) {
+                const Eigen::Vector3d slope = grad * nodal_H;
+                const double across = along.dot(slope);
+                of_gradients = space.gather(fields.mu, cell).dot(phi) * s.H +
+                               bending.kg * (slope.squaredNorm() * s.area - 2 * across * across);
+            }
+            sum +=
+                table.weight[q] * x.area *
+                (of_gradients + f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + 2 * law.viscosity * strain);
         }
         of_cell[cell] = sum;
     });

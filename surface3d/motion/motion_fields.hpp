@@ -15,6 +15,7 @@ struct MotionFields {
     VectorField normal;
     Eigen::VectorXd H, K;
     Eigen::VectorXd H0 = {};  // where it varies; else empty
+    Eigen::VectorXd mu = {};  // -2 kg Lap H, of theory.md (2.26); empty where kg = 0
 
     double H0_at(const Bending& bending, Eigen::Index node) const { return H0.size() > 0 ? H0[node] : bending.H0; }
 };
@@ -46,7 +47,7 @@ inline CellColumns<1> gather_H0(const SurfaceSpace& space, const Eigen::VectorXd
 }
 
 // SolveError if the mesh is degenerate.
-MotionFields motion_fields(const SurfaceSpace& space, const CurvedMesh& mesh, const Projection& project);
+MotionFields motion_fields(const SurfaceSpace& space, const CurvedMesh& mesh, const Projection& project, double kg = 0);
 
 // -(grad nu)^sym of the normal `nodal` of a cell, in the tangent plane of the point; see gradients().
 inline Eigen::Matrix3d shape_operator(const SurfacePoint<double>& p, const CellColumns<3>& gradient,

@@ -8,13 +8,13 @@
 namespace tubule::surface3d {
 namespace {
 
-// Whether the density depends on H, on K: evaluated at a generic point.
+// Whether the energy depends on H, on K: the density evaluated at a generic point.
 struct Dependence {
     bool H, K;
 };
 Dependence dependence(const Bending& bending) {
     const CurvatureJet<double> f = density(bending, bending.H0 + 0.7310, 0.3170);
-    return {f.H != 0, f.K != 0};
+    return {f.H != 0 || bending.kg != 0, f.K != 0};
 }
 
 }  // namespace
@@ -24,11 +24,12 @@ int pressure_order(const SurfaceLaw& law, int order) {
 }
 
 MotionUnknowns::MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending)
-    : FieldUnknowns(mesh, law.components() + dependence(bending).H + dependence(bending).K,
+    : FieldUnknowns(mesh, law.components() + dependence(bending).H + dependence(bending).K + (bending.kg != 0),
                     pressure_order(law, mesh.order)) {
     int next = law.components() * nodes();
     if (dependence(bending).H) H = std::exchange(next, next + nodes());
     if (dependence(bending).K) K = std::exchange(next, next + nodes());
+    if (bending.kg != 0) mu = std::exchange(next, next + nodes());
     if (law.inextensible) p = next;
 }
 
@@ -73,6 +74,7 @@ public:
           nv_(law.components() * n_),
           H_(unknowns.H < 0 ? -1 : nv_),
           K_(unknowns.K < 0 ? -1 : nv_ + (H_ < 0 ? 0 : n_)),
+          mu_(unknowns.mu < 0 ? -1 : nv_ + n_ + (K_ < 0 ? 0 : n_)),
           p_(unknowns.p < 0 ? -1 : unknowns.width() - pressure_table_.functions()),
           of_cell_(law.free_period ? space.cells() : 0) {}
 
@@ -122,12 +124,14 @@ private:
     ExpectedMotion expected_motion(int cell) const;
     void add_advection(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_momentum(const std::vector<Point>& at, int cell, CellWork& work) const;
+    Eigen::Vector2d slope_of_H(int cell, int q, const CellTables& t) const;
+    void add_gradients(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_varying_H0(const std::vector<Point>& at, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
     void add_places(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
-    void add_stretch(const std::vector<Point>& at, CellWork& work) const;
+    void add_stretch(const std::vector<Point>& at, int cell, CellWork& work) const;
 
     const SurfaceSpace& space_;
     const MotionUnknowns& unknowns_;
@@ -137,7 +141,7 @@ private:
     const Tabulation& table_;
     const std::optional<Formula> W_;
     Tabulation pressure_table_;
-    int n_, nv_, H_, K_, p_;                // nodes and velocities of a cell, first columns of its blocks
+    int n_, nv_, H_, K_, mu_, p_;           // nodes and velocities of a cell, first columns of its blocks
     std::vector<Eigen::Vector3d> of_cell_;  // own, energy and M of a stretch: their sum does not depend on the threads
 };
 
@@ -274,6 +278,42 @@ void Assembler::add_momentum(const std::vector<Point>& at, int cell, CellWork& w
     Eigen::MatrixXd weighted = t.strain;
     for (int q = 0; q < Q; ++q) weighted.middleRows<3>(3 * q) *= 2 * law_.viscosity * at[q].dS;
     work.block.topLeftCorner(nv_, nv_).noalias() += t.strain.transpose() * weighted;
+}
+
+Eigen::Vector2d Assembler::slope_of_H(int cell, int q, const CellTables& t) const {
+    return t.grad.middleRows<2>(2 * q) * space_.gather(base_.fields.H, cell);
+}
+
+// The gradient term, theory.md (2.26), (10.25): -(grad mu, G(v)) + (|B|^2 mu + kg (2 B - H) (grad H, grad H), v.nu),
+// linear in mu and H about those of X*, with (mu, phi) - 2 kg (grad H, grad phi) = 0.
+void Assembler::add_gradients(const std::vector<Point>& at, int cell, CellWork& work) const {
+    if (mu_ < 0) return;
+    const CellTables& t = work.t;
+    const int Q = table_.points();
+    const double kg = bending_.kg;
+    Eigen::MatrixXd slopes(Q, n_);  // of the term that is quadratic in grad H
+    Eigen::VectorXd force = Eigen::VectorXd::Zero(nv_);
+    for (int q = 0; q < Q; ++q) {
+        const Point& s = at[q];
+        const auto g = t.grad.middleRows<2>(2 * q);
+        const Eigen::Vector2d H = slope_of_H(cell, q, t);
+        const Eigen::Vector2d slope = kg * (4 * (s.B * s.e) * H - 2 * s.trace * H);
+        slopes.row(q) = s.dS * (slope.transpose() * g);
+        force += (s.dS * slope.dot(H) / 2) * t.normal.row(q).transpose();
+        work.weighted2.middleRows<2>(2 * q) = s.dS * g;
+        work.weighted1.row(q) = s.dS * t.phi.row(q);
+    }
+    const CellMatrix stiffness = t.grad.transpose() * work.weighted2, mass = t.phi.transpose() * work.weighted1;
+    work.block.block(mu_, mu_, n_, n_) += mass;
+    work.block.block(mu_, H_, n_, n_) -= 2 * kg * stiffness;
+    for (int q = 0; q < Q; ++q) work.weighted1.row(q) *= at[q].B2;
+    auto by_mu = work.block.block(0, mu_, nv_, n_);
+    by_mu.noalias() += t.normal.transpose() * work.weighted1;
+    by_mu.noalias() -= t.normal_grad.transpose() * work.weighted2;
+    work.block.block(0, H_, nv_, n_).noalias() += t.normal.transpose() * slopes;
+    work.rhs.head(nv_) += force;
+    work.force.head(nv_) += force;
+    work.force.head(nv_) -= by_mu * space_.gather(base_.fields.mu, cell);
 }
 
 // -(grad f_H + (HP-B) grad f_K, G(v)) + (|B|^2 f_H + H K f_K - H f, v.nu) - tension (H - H*, v.nu), linear in H and K
@@ -428,7 +468,7 @@ void Assembler::add_curvature_evolution(const std::vector<Point>& at, int cell, 
 
 // The column and the row of a stretch e, u = .. + e z e_z: theory.md (3.19), (10.18). Nodes go along with it, so that H
 // and K change as those of points of the membrane.
-void Assembler::add_stretch(const std::vector<Point>& at, CellWork& work) const {
+void Assembler::add_stretch(const std::vector<Point>& at, int cell, CellWork& work) const {
     if (!law_.free_period) return;
     const CellTables& t = work.t;
     for (int q = 0; q < table_.points(); ++q) {
@@ -446,6 +486,13 @@ void Assembler::add_stretch(const std::vector<Point>& at, CellWork& work) const 
         };
         add(H_, by.H, s.f.HH * by.H + s.f.HK * by.K + s.f.H, s.H);
         add(K_, by.K, s.f.HK * by.H + s.f.KK * by.K + s.f.K * (2 - 3 * by.area), s.K);
+        if (mu_ >= 0) {
+            const Eigen::Vector2d H = slope_of_H(cell, q, t),
+                                  slope = 2 * bending_.kg * (by.area * H - 2 * by.along.dot(H) * by.along);
+            work.row.segment(mu_, n_) += (s.dS * by.H) * phi;
+            work.row.segment(H_, n_) += s.dS * (t.grad.middleRows<2>(2 * q).transpose() * slope);
+            work.energy -= s.dS * slope.dot(H) / 2;
+        }
         if (p_ >= 0) work.row.tail(t.psi.cols()) -= (s.dS * by.area) * t.psi.row(q).transpose();
         if (law_.viscosity == 0) continue;
         const double drag = 2 * law_.viscosity * s.dS;
@@ -471,12 +518,13 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
     }
     add_advection(at, cell, work);
     add_momentum(at, cell, work);
+    add_gradients(at, cell, work);
     add_bending(at, cell, work);
     add_varying_H0(at, work);
     add_pressure(at, work);
     add_places(at, cell, work);
     add_curvature_evolution(at, cell, work);
-    add_stretch(at, work);
+    add_stretch(at, cell, work);
     unknowns_.add(system.A, cell, work.block);
     if (law_.inertia != 0) space_.add(system.advection, cell, work.advection);
     const int* numbers = unknowns_.of_cell(cell);

@@ -19,7 +19,7 @@ int pressure_order(const SurfaceLaw& law, int order);
 struct MotionUnknowns : FieldUnknowns {
     MotionUnknowns(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending);
 
-    int H = -1, K = -1, p = -1;  // first number of each, or -1 where there is none; the velocity begins at 0
+    int H = -1, K = -1, mu = -1, p = -1;  // first number of each, or -1 where there is none; the velocity begins at 0
 };
 
 // The state about which a step is linearised: the surface X* expected at its end, and its history. Over the
@@ -67,9 +67,9 @@ struct StepSystem {
         advection;  // (c.grad phi_b, phi_a), c = u* - w* along the surface; empty without inertia
 };
 
-// H and K at the end of the step are unknowns, coupled to u by their evolution equations: the bending force is implicit
-// in both. Of area differences it has what is known on X*, alpha (M - M0) with its M: theory.md (10.5), (10.6), (10.7),
-// (10.8).
+// H, K and, where kg > 0, mu = -2 kg Lap H at the end of the step are unknowns, coupled to u by their evolution
+// equations: the bending force is implicit in both. Of area differences it has what is known on X*, alpha (M - M0) with
+// its M: theory.md (10.5), (10.6), (10.7), (10.8).
 void assemble(const SurfaceSpace& space, const MotionUnknowns& unknowns, const SurfaceLaw& law, const Bending& bending,
               const StepBase& base, StepSystem& system);
 

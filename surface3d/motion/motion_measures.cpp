@@ -74,14 +74,17 @@ void measure_neck(const CurvedMesh& mesh, MotionMeasures& m) {
 // The quadratic in x is smallest at one of the principal curvatures or in between.
 void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
     m.symbol = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd scale = Eigen::VectorXd::Constant(mesh.size(), HUGE_VAL);  // of waves that kg alone holds
     for (int i = 0; i < mesh.size(); ++i) {
         const double H = m.fields.H[i], K = m.fields.K[i], half = std::sqrt(std::max(H * H / 4 - K, 0.0));
         const CurvatureJet<double> f = density_at(bending, m.fields.H0_at(bending, i), H, K);
         const auto at = [&](double x) { return f.HH + 2 * f.HK * x + f.KK * x * x; };
         double least = std::min(at(H / 2 - half), at(H / 2 + half));
         if (f.KK > 0) least = std::min(least, at(std::clamp(-f.HK / f.KK, H / 2 - half, H / 2 + half)));
-        if (!(least >= m.symbol)) m.symbol = least, m.least_symbol = mesh.nodes[i];
+        if (bending.kg > 0 && least < 0) scale[i] = std::sqrt(-2 * bending.kg / least);
+        if (bending.kg == 0 && !(least >= m.symbol)) m.symbol = least, m.least_symbol = mesh.nodes[i];
     }
+    if (bending.kg > 0) m.coarse_wave = coarseness(mesh, scale);
 }
 
 void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {

@@ -25,6 +25,7 @@ struct MotionMeasures {
     double length = 0;                    // the period, or the distance of beads
     WallDistance wall;                    // from the walls of potentials
     Coarseness coarse_wall, coarse_bead;  // of the mesh near them
+    Coarseness coarse_wave;               // where kg > 0: the symbol is negative, see theory.md (2.26)
     double kinetic = 0;                   // inertia INT |u|^2/2
     double dissipation = 0;               // INT 2 viscosity |sigma|^2 + friction |u|^2
     double acceleration = 0;  // inertia INT |d_t u|^2 dS/2: kinetic energy gained from rest, per time squared

@@ -115,7 +115,7 @@ MotionFields MovingSurface::fields(const CurvedMesh& mesh) {
         projection_->update(space_, mesh);
     else
         projection_.emplace(space_, mesh);
-    MotionFields out = motion_fields(space_, mesh, *projection_);
+    MotionFields out = motion_fields(space_, mesh, *projection_, bending_.kg);
     out.H0 = H0_;
     return out;
 }

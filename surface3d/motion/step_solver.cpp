@@ -86,6 +86,7 @@ double evenness(const CurvatureJet<double>& f, double H, double K) {
 // What the evolution of H and K is multiplied by. Where the Hessian is nearly singular somewhere, not that but what is
 // positive in its diagonal, or 1: rows must not vanish.
 std::vector<Eigen::Matrix2d> row_factors(const Bending& bending, const MotionFields& fields) {
+    const bool gradients = bending.kg != 0;  // of H: its row does not vanish then
     const Eigen::Index n = fields.H.size();
     std::vector<CurvatureJet<double>> f(n);
     bool regular = true;
@@ -100,7 +101,8 @@ std::vector<Eigen::Matrix2d> row_factors(const Bending& bending, const MotionFie
         if (HK != 0 && regular)
             out[i] << HH, HK, HK, KK;
         else
-            out[i] << or_one(HH, HK == 0 ? HH != 0 : HH > 0), 0, 0, or_one(KK, HK == 0 ? KK != 0 : KK > 0);
+            out[i] << (gradients ? HH : or_one(HH, HK == 0 ? HH != 0 : HH > 0)), 0, 0,
+                or_one(KK, HK == 0 ? KK != 0 : KK > 0);
     }
     return out;
 }
@@ -109,16 +111,21 @@ std::vector<Eigen::Matrix2d> row_factors(const Bending& bending, const MotionFie
 
 // The evolution of H and K, times -1/te times the Hessian of the density in (H, K) at each node, is the transpose of
 // the force but for terms without derivatives, the variation of the Hessian, what is carried along the surface, and the
-// stabilisation of L_H: theory.md (10.7), (10.8).
+// stabilisation of L_H: theory.md (10.7), (10.8). With the gradient term the row of mu becomes -1/te times the
+// evolution of H, and what it was, the definition of mu, goes to that of H: the columns of mu in the force and of mu in
+// the row of H are then transposes of rows.
 void StepSolver::make_symmetric(const StepBase& base) {
-    const int n = surface_.nodes(), H = unknowns_.H, K = unknowns_.K;
+    const int n = surface_.nodes(), H = unknowns_.H, K = unknowns_.K, mu = unknowns_.mu;
     std::vector<Eigen::Matrix2d> factor = row_factors(surface_.bending(), base.fields);
     for (Eigen::Matrix2d& one : factor) one *= -1 / base.te;
     // Pairs of rows, or the one that there is: their entries in a column.
-    const auto scale = [&](int i, double* of_H, double* of_K) {
+    const auto scale = [&](int i, double* of_H, double* of_K, double* of_mu) {
         const Eigen::Vector2d old(of_H ? *of_H : 0, of_K ? *of_K : 0), out = factor[i] * old;
         if (of_H) *of_H = of_K ? out[0] : factor[i](0, 0) * old[0];
         if (of_K) *of_K = of_H ? out[1] : factor[i](1, 1) * old[1];
+        if (!of_mu) return;
+        *of_H -= *of_mu / base.te;
+        *of_mu = -old[0] / base.te;
     };
     Eigen::SparseMatrix<double>& A = system_.A;
     parallel_for(static_cast<std::size_t>(A.cols()), [&](std::size_t j) {
@@ -127,15 +134,16 @@ void StepSolver::make_symmetric(const StepBase& base) {
         double* value = A.valuePtr() + A.outerIndexPtr()[j];
         // Nodes that a column meets are the same for all fields.
         const auto first = [&](int field) { return field < 0 ? nullptr : std::lower_bound(begin, end, field); };
-        const int *rows_H = first(H), *rows_K = first(K), *rows = rows_H ? rows_H : rows_K;
+        const int *rows_H = first(H), *rows_K = first(K), *rows_mu = first(mu), *rows = rows_H ? rows_H : rows_K;
         if (!rows) return;
         const int field = rows_H ? H : K;
         for (int k = 0; rows + k < end && rows[k] < field + n; ++k)
             scale(rows[k] - field, rows_H ? value + (rows_H - begin) + k : nullptr,
-                  rows_K ? value + (rows_K - begin) + k : nullptr);
+                  rows_K ? value + (rows_K - begin) + k : nullptr, rows_mu ? value + (rows_mu - begin) + k : nullptr);
     });
     const auto scale_vector = [&](Eigen::VectorXd& v) {
-        for (int i = 0; i < n; ++i) scale(i, H >= 0 ? &v[H + i] : nullptr, K >= 0 ? &v[K + i] : nullptr);
+        for (int i = 0; i < n; ++i)
+            scale(i, H >= 0 ? &v[H + i] : nullptr, K >= 0 ? &v[K + i] : nullptr, mu >= 0 ? &v[mu + i] : nullptr);
     };
     scale_vector(system_.b);
     if (surface_.law().free_period) scale_vector(system_.stretch.column);
@@ -145,10 +153,8 @@ namespace {
 
 // With room for `most` columns, of which these are the first.
 BorderedSolver::Border border_of(Eigen::Index unknowns, Eigen::Index most, const Eigen::MatrixXd& first) {
-    BorderedSolver::Border out{Eigen::MatrixXd::Zero(unknowns, most),
-                               {},
-                               Eigen::MatrixXd::Zero(most, most),
-                               Eigen::VectorXd::Zero(most)};
+    BorderedSolver::Border out{
+        Eigen::MatrixXd::Zero(unknowns, most), {}, Eigen::MatrixXd::Zero(most, most), Eigen::VectorXd::Zero(most)};
     out.C.topLeftCorner(first.rows(), first.cols()) = first;
     out.R = out.C;
     return out;
@@ -248,9 +254,9 @@ Eigen::VectorXd StepSolver::mesh_flux(const StepBase& base, const Eigen::VectorX
     return out;
 }
 
-// How the positions P and multipliers q of beads, theory.md (2.23), follow the surface from X*, to first order. This must
-// be implicit: where a viscous membrane is flat, it does not resist motion along its normal. Columns: P and q of each
-// bead, then the force that holds the distance beyond the expected one.
+// How the positions P and multipliers q of beads, theory.md (2.23), follow the surface from X*, to first order. This
+// must be implicit: where a viscous membrane is flat, it does not resist motion along its normal. Columns: P and q of
+// each bead, then the force that holds the distance beyond the expected one.
 void StepSolver::add_beads(const StepBase& base, const Extent& rate, BorderedSolver::Border& border,
                            Eigen::Index& n) const {
     const Eigen::Index first = n, force = n + numbers_of_beads;
@@ -306,6 +312,7 @@ double StepSolver::work(const MovingSurface::Correction& by, const MotionState& 
         double energy = s.energy + law.potential_rate(at.time, s.rate, volume);
         if (unknowns_.H >= 0) energy += s.row.segment(unknowns_.H, n).dot(fields.H);
         if (unknowns_.K >= 0) energy += s.row.segment(unknowns_.K, n).dot(fields.K);
+        if (unknowns_.mu >= 0) energy += s.row.segment(unknowns_.mu, n).dot(fields.mu);
         sum += by.stretch * energy;
     }
     return sum - paired(system_.force, by.displacement, fields);

@@ -100,6 +100,7 @@ SeriesTable<MotionRow> motion_series(const Problem& c) {
     });
     table.add_family("energy_<kl>", term_names(energy),
                      [](const MotionRow& r, std::size_t term) { return r.measures.bending.energy_term[term]; });
+    if (energy.kg > 0) table.add({{"energy_kg", [](const MotionRow& r) { return r.measures.bending.energy_kg; }}});
     if (energy.alpha)
         table.add({{"energy_alpha", [](const MotionRow& r) { return r.measures.bending.energy_alpha; }},
                    {"M", [](const MotionRow& r) { return r.measures.bending.M; }}});

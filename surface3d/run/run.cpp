@@ -233,6 +233,7 @@ SeriesTable<RestRow> rest_series(const Problem& c) {
     });
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const RestRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    if (c.energy.kg > 0) table.add({{"energy_kg", [](const RestRow& r) { return r.o.energy_kg; }}});
     if (c.energy.alpha)
         table.add({{"energy_alpha", [](const RestRow& r) { return r.o.energy_alpha; }},
                    {"M", [](const RestRow& r) { return r.o.M; }}});

@@ -383,7 +383,7 @@ class Check(ProgramTest):
     def test_what_a_case_comes_to_is_a_case(self):
         out, _ = self.tubule("check", "--quick", self.case, "--set", "energy.k40=0.25")
         case = tomllib.loads(out)
-        self.assertEqual(case["energy"], {"k20": 0.5, "H0": -1.0, "k40": 0.25, "k42": 0.1})
+        self.assertEqual(case["energy"], {"k20": 0.5, "H0": -1.0, "k40": 0.25, "k42": 0.1, "kg": 0.0})
         self.assertEqual(case["accuracy"]["r_min"], 1e-3)  # a default
         again = self.tubule("check", "--quick", self.write("again.toml", out))[0]
         self.assertEqual(again.split("\n", 1)[1], out.split("\n", 1)[1])

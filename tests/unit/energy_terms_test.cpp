@@ -77,6 +77,19 @@ TEST(EnergyTerms, UnboundedDensitiesAreKnown) {
     EXPECT_TRUE(unbounded({0, 0, 0}, {formula(-3, "log(1 + H^2)")}));
 }
 
+TEST(EnergyTerms, ThinTubesAndSmallSpheresHaveNoGradients) {
+    const auto words = [](double k20, double k40, double k42) {
+        return unbounded_below(Bending{.k = {k20, k40, k42}, .H0 = -1, .kg = 0.3});
+    };
+    EXPECT_NE(words(-1, 0, 0).find("ever smaller spheres"), std::string::npos);  // f = -H^2 is 4 times that of tubes
+    EXPECT_NE(words(1, 0, -2).find("ever smaller spheres"), std::string::npos);
+    EXPECT_NE(unbounded_below(Bending{.k = {-1, 0, 1}, .H0 = 0, .kg = 0.3}).find("thinner straight tubes"),
+              std::string::npos);
+    EXPECT_EQ(words(-1, 1, 0), "");
+    EXPECT_EQ(words(0, 1, -3), "");  // saddles have no bound of f, but they have gradients
+    EXPECT_NE(unbounded_below(Bending{.k = {0, 1, -3}, .H0 = -1}), "");
+}
+
 TEST(EnergyTerms, TheSymbolOfSumsOfSquaresKeepsItsSign) {
     const auto may_vanish = [](std::vector<EnergyTerm> terms) {
         return symbol_may_vanish(Bending{.k = {1, 0, 0}, .H0 = 0, .terms = std::move(terms)});

@@ -30,7 +30,7 @@ bool only_k20(const Bending& energy) {
     for_each_bending_term([&](std::size_t i, const auto& term) {
         only = only && (std::string_view(term.key) == "k20" ? energy.k[i] > 0 : energy.k[i] == 0);
     });
-    return only && energy.terms.empty();
+    return only && energy.terms.empty() && energy.kg == 0;
 }
 
 // Whether its equilibria without energy are the surfaces of constant mean curvature H0, and of which period:
