@@ -77,13 +77,9 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
             fmt::format("an element near a bead is {:.2g} times as long as model.bead_width", s.coarse_bead),
             "ask for more accuracy, or set discretisation.elements; wider beads need fewer"};
     if (s.o.coarse > 1)
-        return StopReport{
-            Stop::resolution_lost, time,
-            fmt::format(
-                "an element near s = {:.4g} is {:.2g} times as long as sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|), "
-                "the scale of waves that the gradient term alone holds",
-                s.o.s_coarse, s.o.coarse),
-            "ask for more accuracy, or set discretisation.elements; a larger energy.kg needs fewer"};
+        return StopReport{Stop::resolution_lost, time,
+                          unresolved_waves(fmt::format("an element near s = {:.4g} is", s.o.s_coarse), s.o.coarse),
+                          "ask for more accuracy, or set discretisation.elements; a larger energy.kg needs fewer"};
     const std::vector<double>& breaks = space.splines().breaks();
     const int e = space.splines().element_at(s.o.s_curvature);
     const double turn = s.o.curvature * s.o.g_max * (breaks[e + 1] - breaks[e]);

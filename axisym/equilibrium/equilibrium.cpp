@@ -307,16 +307,17 @@ std::vector<double> next_breaks(const CurveSpace& space, const std::vector<doubl
     return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
 }
 
-// Why no shape was found, from the first one and the last.
+// Why no shape was found, from the first one and the last of a descent.
 std::string why_none(const Constraints& goal, const CurveObservation& first, const CurveObservation& last,
-                     int iterations) {
+                     bool descended, int iterations) {
     const double symbol = std::min(first.symbol, last.symbol);
     if (!(symbol > 0))
         return fmt::format(
             "the energy has no minimum there: ever shorter waves lower it (its principal symbol falls "
             "to {:.3g}; see the moduli in [energy])",
             symbol);
-    const std::string missed = missed_constraint(goal, first.area, first.volume, last.area, last.volume);
+    std::string missed;
+    if (descended) missed = missed_constraint(goal, first.area, first.volume, last.area, last.volume);
     return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
 }
 
@@ -466,7 +467,7 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         next << finer->prolong(*space, x), u.tail(system.numbers());
         space = finer, u = next;
     }
-    return end(Stop::solver_failed, why_none(problem.constraints, first, last, out.iterations));
+    return end(Stop::solver_failed, why_none(problem.constraints, first, last, settings.descend, out.iterations));
 }
 
 }  // namespace

@@ -8,20 +8,25 @@ std::vector<TermCheck> check_terms(const Forms& forms, const Eigen::VectorXd& x)
     std::vector<TermCheck> checks;
     const Bending& all = forms.bending();
     const std::vector<std::string> names = term_names(all);
+    const auto add = [&](const std::string& key, const Bending& alone) {
+        const Forms single(forms.space(), alone);
+        checks.push_back(
+            {key, check_derivatives([&](const Eigen::VectorXd& y) { return single.free_energy(y); },
+                                    [&](const Eigen::VectorXd& y) { return single.gradient(y); },
+                                    [&](const Eigen::VectorXd& y, const Eigen::VectorXd& w) -> Eigen::VectorXd {
+                                        return single.hessian(y) * w;
+                                    },
+                                    x)});
+    };
     for (std::size_t i = 0; i < count_terms(all); ++i) {
         if (modulus(all, i) == 0) continue;
         Bending alone = all;
+        alone.kg = 0;
         for (std::size_t j = 0; j < count_terms(all); ++j)
             if (j != i) modulus(alone, j) = 0;
-        const Forms single(forms.space(), alone);
-        checks.push_back({(i < n_bending_terms || !all.terms[i - n_bending_terms].formula ? "k" : "") + names[i],
-                          check_derivatives([&](const Eigen::VectorXd& y) { return single.free_energy(y); },
-                                            [&](const Eigen::VectorXd& y) { return single.gradient(y); },
-                                            [&](const Eigen::VectorXd& y, const Eigen::VectorXd& w) -> Eigen::VectorXd {
-                                                return single.hessian(y) * w;
-                                            },
-                                            x)});
+        add((i < n_bending_terms || !all.terms[i - n_bending_terms].formula ? "k" : "") + names[i], alone);
     }
+    if (all.kg != 0) add("kg", Bending{.kg = all.kg});
     return checks;
 }
 

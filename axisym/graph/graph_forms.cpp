@@ -58,6 +58,7 @@ Forms::Forms(const SplineSpace& space, const Bending& bending, const Loads& load
     : space_(space), bending_(bending), loads_(loads), images_(space.cell().images()) {
     const int w = space.width(), degree = space.degree();
     if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
+    if (bending.kg != 0) gradients_.emplace(space_);
     std::vector<Eigen::Triplet<double>> entries;
     entries.reserve(space.elements() * w * w);
     for (int e = 0; e < space.elements(); ++e)
@@ -204,6 +205,7 @@ template <int P>
 bool Forms::residual(const double* x, const double* v, double* out) const {
     std::fill_n(out, space_.size(), 0.0);
     const bool inside = for_degree(space_.degree(), [&](auto P) { return residual_kernel<P()>(x, v, out); });
+    if (gradients_) gradients_->add_gradient(bending_.kg, x, out);
     return inside &&
            (bending_.terms.empty() || std::all_of(out, out + space_.size(), [](double y) { return std::isfinite(y); }));
 }
@@ -211,6 +213,7 @@ bool Forms::residual(const double* x, const double* v, double* out) const {
 void Forms::jacobian(const double* x, const double* v, double cj, double* values) const {
     std::fill_n(values, pattern_.nonZeros(), 0.0);
     for_degree(space_.degree(), [&](auto P) { jacobian_kernel<P()>(x, v, cj, values); });
+    if (gradients_) gradients_->add_hessian(bending_.kg, x, slots_, values);
 }
 
 void Forms::mass(const double* x, double* values) const {
@@ -241,7 +244,8 @@ template <int P>
 }
 
 double Forms::axial_force(const Eigen::VectorXd& x) const {
-    return for_degree(space_.degree(), [&](auto P) { return axial_force_kernel<P()>(x.data()); });
+    const double force = for_degree(space_.degree(), [&](auto P) { return axial_force_kernel<P()>(x.data()); });
+    return gradients_ ? force + bending_.kg * gradients_->stretch_slope(x.data()) / space_.cell().period() : force;
 }
 
 Eigen::VectorXd Forms::gradient(const Eigen::VectorXd& x) const {
@@ -296,7 +300,7 @@ template <int P>
                 const auto f = density<Pack, added>(bending_, p.H, p.K);
                 const Pack s = principal_symbol(f, p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
                 const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-                o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
+                if (!gradients_) o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
                 if (stiffness) {
                     const Pack ig2 = p.inverse_speed * p.inverse_speed;
                     stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));
@@ -305,7 +309,11 @@ template <int P>
                     if (at.r[q] < o.r_min) o.r_min = at.r[q], o.z_min = basis.z[q];
                     if (at.r[q] > o.r_max) o.r_max = at.r[q], o.z_max = basis.z[q];
                     if (steep[q] > o.steepness) o.steepness = steep[q], o.z_steep = basis.z[q];
-                    if (s[q] < o.symbol) o.symbol = s[q], o.z_symbol = basis.z[q];
+                    if (!gradients_ && s[q] < o.symbol) o.symbol = s[q], o.z_symbol = basis.z[q];
+                    if (!gradients_ || s[q] >= 0) continue;
+                    const double size = (space_.breaks()[e + 1] - space_.breaks()[e]) / p.inverse_speed[q],
+                                 coarse = size * std::sqrt(-s[q] / (2 * bending_.kg));
+                    if (coarse > o.coarse) o.coarse = coarse, o.z_coarse = basis.z[q];
                 }
             }
         }
@@ -316,7 +324,6 @@ template <int P>
         o.energy_term.reserve(count_terms(bending_));
         for (const Pack& term : listed) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
         for (const Pack& term : more) o.energy += o.energy_term.emplace_back(images_ * stdx::reduce(term));
-        o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
         return o;
     };
     return by_added(bending_, kernel);
@@ -329,8 +336,12 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
         stiffness = defect->data();
     }
     Observation o = for_degree(space_.degree(), [&](auto P) { return observe_kernel<P()>(x, v, stiffness); });
+    if (gradients_) o.energy += o.energy_kg = bending_.kg * gradients_->value(x);
+    o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
     o.domain = domain(x);
     if (!defect) return o;
+    std::vector<double> of_gradients;
+    if (gradients_) of_gradients = gradients_->stiffness(bending_.kg * space_.bernoulli_norm_of_third() / 4, x);
     const int n = space_.elements();
     const auto& breaks = space_.breaks();
     const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
@@ -344,7 +355,9 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
         const int f = e + 1 < n ? e + 1 : mirror ? e : 0;
         const double after = e + 1 < n ? space_.top_derivative(x, e + 1) : mirror ? -last : first;
         const double next = jump(e, f, here, after);
-        (*defect)[e] *= defect_scale_[e] * (next * next + previous * previous);
+        double loss = defect_scale_[e] * (*defect)[e];
+        if (gradients_) loss += of_gradients[e] * std::pow(size(e), 2 * (space_.degree() - 2));
+        (*defect)[e] = loss * (next * next + previous * previous);
         here = after, previous = next;
     }
     return o;
@@ -375,8 +388,8 @@ double Forms::reference_energy(const Eigen::VectorXd& x) const {
             }
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
     const Observation o = observe(x.data(), rest.data());
-    return std::max(std::abs(o.free_energy),
-                    images_ * magnitude + std::abs(loads_.tension) * o.area + std::abs(loads_.pressure) * o.volume);
+    return std::max(std::abs(o.free_energy), images_ * magnitude + o.energy_kg + std::abs(loads_.tension) * o.area +
+                                                 std::abs(loads_.pressure) * o.volume);
 }
 
 std::array<Eigen::VectorXd, 2> Forms::mode(int n) const {

@@ -5,8 +5,10 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <array>
+#include <optional>
 #include <vector>
 
+#include "axisym/graph/graph_gradients.hpp"
 #include "axisym/splines/spline_space.hpp"
 #include "common/energy/bending.hpp"
 #include "common/model/model.hpp"
@@ -18,6 +20,7 @@ namespace tubule::axisym {
 struct Observation {
     double energy = 0, free_energy = 0;
     std::vector<double> energy_term;  // of each term, see term_names()
+    double energy_kg = 0;             // of the gradient term, theory.md (2.25)
     double dissipation = 0;           // INT b^2 dS of the rate handed in: -dF/dt along the flow
     double area = 0, volume = 0;
     double r_min = 0, z_min = 0;  // smallest radius at quadrature points, and where
@@ -25,6 +28,7 @@ struct Observation {
     double steepness = 0, z_steep = 0;  // largest |r'| r_min / r: O(1) on a catenoidal neck, unbounded at an overhang
     double symbol = 0, z_symbol = 0;    // smallest principal symbol, theory.md (2.14), for x = kappa_theta
     double symbol_3d = 0;               // the same over all x between the principal curvatures
+    double coarse = 0, z_coarse = 0;    // as of CurveObservation, where kg > 0; the symbol does not matter then
     FormulaDomain::Margin domain;       // of the energy's formula; its place is z
 };
 
@@ -87,7 +91,8 @@ private:
     const SplineSpace& space_;
     Bending bending_;
     Loads loads_;
-    double images_;  // cells in the whole period
+    std::optional<GraphGradients> gradients_;  // where kg > 0
+    double images_;                            // cells in the whole period
     Eigen::SparseMatrix<double> pattern_;
     std::vector<double> defect_scale_;  // of each element, see observe()
     std::vector<int> slots_;            // place in pattern_ of the local matrix entries of each element

@@ -34,6 +34,13 @@ std::span<const GraphGuard> graph_guards() {
                              stage.place(o.z_symbol), o.symbol),
                  "refinement does not help: the energy does not resist short waves there"};
          }},
+        {[](const Observation& o, const GraphLimits&) { return 1 - o.coarse; },
+         [](const Observation& o, const GraphMesh& stage, const double*, double time) {
+             return StopReport{
+                 Stop::resolution_lost, time,
+                 unresolved_waves(fmt::format("an element near z = {:.6g} is", stage.place(o.z_coarse)), o.coarse),
+                 "ask for more accuracy, or set discretisation.elements; a larger energy.kg needs fewer"};
+         }},
         {[](const Observation& o, const GraphLimits&) { return o.domain.is_small() ? -1 : 1.0; },
          [](const Observation& o, const GraphMesh& stage, const double*, double time) {
              return undefined_energy(o.domain, time, fmt::format("z = {:.6g}", stage.place(o.domain.place)));

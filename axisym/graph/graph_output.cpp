@@ -19,6 +19,7 @@ SeriesTable<GraphRow> graph_series(const Problem& c) {
                {"energy", [](const GraphRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
                      [](const GraphRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    if (c.energy.kg > 0) table.add({{"energy_kg", [](const GraphRow& r) { return r.o.energy_kg; }}});
     table.add({{"free_energy", [](const GraphRow& r) { return r.o.free_energy; }},
                {"dissipation", [](const GraphRow& r) { return r.o.dissipation; }},
                {"identity_defect", [](const GraphRow& r) { return r.identity_defect; }},

@@ -56,6 +56,13 @@ std::string key_of_ill_posed(const Problem& c) {
     return key.empty() ? "energy" : key;
 }
 
+std::string unresolved_waves(const std::string& what, double times) {
+    return fmt::format(
+        "{} {:.2g} times sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|), the scale of waves that the gradient term alone "
+        "holds",
+        what, times);
+}
+
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where) {
     return {Stop::undefined, time, fmt::format("the energy is hardly defined any more at {}: {}", where, words(margin)),
             "choose a formula that is defined for all curvatures and places which the membrane may take"};

@@ -16,6 +16,8 @@ CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, con
 std::string key_of_formula(const Bending& energy);
 
 // The stop of a run that comes too near to where the formula is not defined.
+// Of a guard: `what`, "an element is" say, so many times too long for the waves that the gradient term alone holds.
+std::string unresolved_waves(const std::string& what, double times);
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 
 // Where the pressure is a formula of the volume: the stop of a run that comes too near to where it is not defined, and

@@ -108,12 +108,10 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
 
 std::optional<StopReport> find_coarse_place(const MotionMeasures& m, double most, double time) {
     if (m.coarse_wave.value > 1)
-        return StopReport{
-            Stop::resolution_lost, time,
-            fmt::format("near {} nodes are {:.2g} times sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|) apart, the "
-                        "scale of waves that the gradient term alone holds",
-                        where(m.coarse_wave.where), m.coarse_wave.value),
-            "use more elements; a larger energy.kg needs fewer"};
+        return StopReport{Stop::resolution_lost, time,
+                          unresolved_waves(fmt::format("near {} the distance of nodes is", where(m.coarse_wave.where)),
+                                           m.coarse_wave.value),
+                          "use more elements; a larger energy.kg needs fewer"};
     const bool at_wall = m.coarse_wall.value >= m.coarse_bead.value;
     const Coarseness& coarse = at_wall ? m.coarse_wall : m.coarse_bead;
     if (!(coarse.value > most)) return std::nullopt;

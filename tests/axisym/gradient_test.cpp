@@ -8,6 +8,8 @@
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
+#include "axisym/graph/graph_derivatives.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "common/case/read.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "common/theory/dispersion.hpp"
@@ -54,6 +56,13 @@ TEST(Gradients, formsHaveTheirDerivatives) {
         return forms.value({.energy = 1}, y);
     };
     EXPECT_NEAR(forms.stretch_slope({.energy = 1}, x), (stretched(1e-5) - stretched(-1e-5)) / 2e-5, 1e-7);
+    const Cell cell{0, 3, false, 1};
+    for (const int degree : {3, 5, 7}) {
+        const SplineSpace graph(cell, uniform_breaks(cell, 12), degree, degree - 1);
+        const Eigen::VectorXd r = graph.project([](double z) { return 1 + 0.2 * std::cos(2 * pi * z / 3 + 0.4); });
+        for (const TermCheck& one : check_terms(Forms(graph, energy), r))
+            EXPECT_TRUE(one.check.pass()) << one.key << one.check.text();
+    }
     EXPECT_THROW(CurveForms(CurveSpace(Topology::tube, equal_breaks(8), 3, 1, 3), energy), std::invalid_argument);
 }
 
@@ -132,8 +141,8 @@ TEST(Gradients, ratesOfTubesAndSpheres) {
     }
 }
 
-// Waves on tubes that their tension holds, of 20 random energies: growth in runs of profile curves against theory.md
-// (5.28).
+// Waves on tubes that their tension holds, of 20 random energies: growth in runs of graphs and of profile curves
+// against theory.md (5.28).
 TEST(Gradients, wavesFollowTheDispersionRelation) {
     std::mt19937 random(7);
     const auto uniform = [&](double from, double to) { return std::uniform_real_distribution(from, to)(random); };
@@ -147,6 +156,7 @@ TEST(Gradients, wavesFollowTheDispersionRelation) {
         Case c = tube_case(energy, R, length, {{amplitude, n, 0, 0.3}}, end);
         c.model.tension = Ramp(tube.tension);
         explicitly(c, 12 * n + 12, 1e-12, 7);
+        if (i % 2 == 1) c.discretisation.parametrisation = Parametrisation::even;
         const Outcome o = run_case(c);
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         const double measured = std::log(o.last("mode_" + std::to_string(n)) / amplitude);
@@ -198,10 +208,39 @@ TEST(Gradients, energyIsDissipated) {
 TEST(Gradients, unresolvedWavesStopARun) {
     Case c = tube_case(with_gradients(bending(-5), 1e-4), 1, 4, {{1e-3, 1, 0, 0}}, 1e-3);
     explicitly(c, 20, 1e-6);
-    const Outcome o = run_case(c);
-    EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost);
-    EXPECT_NE(o.summary.stop.message.find("the scale of waves that the gradient term alone holds"), std::string::npos)
-        << o.summary.stop.message;
+    for (const auto how : {Parametrisation::graph, Parametrisation::even}) {
+        c.discretisation.parametrisation = how;
+        const Outcome o = run_case(c);
+        EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost);
+        EXPECT_NE(o.summary.stop.message.find("the scale of waves that the gradient term alone holds"),
+                  std::string::npos)
+            << o.summary.stop.message;
+    }
+}
+
+// A graph and a curve of the same tube: energy, force, dissipation.
+TEST(Gradients, graphsAndCurvesAgree) {
+    Case c = tube_case(with_gradients(bending(0.5, 0, 0.02), 0.2), 1, 8, {{0.2, 1, 0, 0}, {0.1, 2, 0, 1}}, 0.1);
+    c.accuracy.energy = 1e-7;
+    const Outcome graph = run_case(c);
+    c.discretisation.parametrisation = Parametrisation::even;
+    const Outcome curve = run_case(c);
+    for (const char* name : {"energy", "energy_kg", "force", "dissipation"})
+        EXPECT_NEAR(graph.last(name), curve.last(name), 1e-6 * graph.summary.reference_energy) << name;
+    EXPECT_GT(graph.last("energy_kg"), 1e-3);
+}
+
+// Where the moduli are well posed, what is known without the term returns as kg -> 0, with the first power of kg.
+TEST(Gradients, vanishWithKg) {
+    const auto energy = [](double kg) {
+        const StationaryProblem problem{with_gradients(bending(0.5), kg), {.area = 4 * pi, .volume = 0.8 * 4 * pi / 3}};
+        const Equilibrium e = find_equilibrium(problem, meridian(Ellipsoid{0.8, 0.8, 1.4}), {.accuracy = 1e-11});
+        EXPECT_EQ(e.stop, Stop::finished) << e.message;
+        return e.observed.energy;
+    };
+    const double without = energy(0), first = (energy(1e-3) - without) / 1e-3, second = (energy(1e-4) - without) / 1e-4;
+    EXPECT_GT(first, 1);
+    EXPECT_NEAR(first / second, 1, 2e-2);
 }
 
 }  // namespace gradient_test
