@@ -66,8 +66,11 @@ const Property tube{"a tube", [](P p) { return may_have_period(p.shape); }},
     no_potential{"a case without energy.potential", [](P p) { return p.energy.potentials.empty(); }},
     closed{"a closed surface", [](P p) { return !is_tube(p.shape); }},
     whole{"a closed surface or a tube", [](P p) { return !may_have_rim(p.shape); }},
-    smooth_shape{"an initial shape whose curvature does not jump, no capsule",
-                 [](P p) { return p.equilibrium || !std::holds_alternative<Capsule>(p.shape); }},
+    smooth_shape{"an initial shape whose curvature does not jump (a capsule needs shape.smooth)",
+                 [](P p) {
+                     const auto* capsule = std::get_if<Capsule>(&p.shape);
+                     return p.equilibrium || !capsule || capsule->smooth > 0;
+                 }},
     rim{"shape.kind = \"patch\"", [](P p) { return may_have_rim(p.shape); }},
     two_rings{"shape.second_radius", [](P p) { return has_two_rings(p.shape); }},
     no_family{"a case without equilibrium.family", [](P p) { return !p.equilibrium || !p.equilibrium->family; }},
@@ -217,7 +220,7 @@ const std::vector<Requirement> rows{
     {"energy.kg",
      [](P p) { return p.energy.kg > 0; },
      {axisym_rest, whole, smooth_shape, smooth_splines},
-     "grad H is not defined otherwise, or not computed",
+     "elsewhere grad H is not defined, or not computed",
      "be 0: a gradient term is"},
     key("energy.M0", {alpha}),
     number("energy.H0", [](P p) { return p.energy.H0_varies(); },

@@ -233,7 +233,8 @@ TEST(Gradients, graphsAndCurvesAgree) {
 // Where the moduli are well posed, what is known without the term returns as kg -> 0, with the first power of kg.
 TEST(Gradients, vanishWithKg) {
     const auto energy = [](double kg) {
-        const StationaryProblem problem{with_gradients(bending(0.5), kg), {.area = 4 * pi, .volume = 0.8 * 4 * pi / 3}};
+        const StationaryProblem problem{with_gradients(bending(0.5), kg),
+                                        {.area = 4 * pi, .volume = 0.8 * 4 * pi / 3, .reduced_volume = {}}};
         const Equilibrium e = find_equilibrium(problem, meridian(Ellipsoid{0.8, 0.8, 1.4}), {.accuracy = 1e-11});
         EXPECT_EQ(e.stop, Stop::finished) << e.message;
         return e.observed.energy;
@@ -241,6 +242,30 @@ TEST(Gradients, vanishWithKg) {
     const double without = energy(0), first = (energy(1e-3) - without) / 1e-3, second = (energy(1e-4) - without) / 1e-4;
     EXPECT_GT(first, 1);
     EXPECT_NEAR(first / second, 1, 2e-2);
+}
+
+// A smooth capsule is where it says, and its energy is finite, as that of the limit from sharp ones is not.
+TEST(Gradients, smoothCapsules) {
+    const Capsule c{0.5, 2, 0.2};
+    const Curve m = meridian(c);
+    for (int i = 0; i <= 40; ++i) {
+        const auto [r, r1, z, z1] = m.at(i / 40.0);
+        const auto u = [&](double x) { return (x + std::hypot(x, c.smooth)) / 2; };
+        const auto du = [&](double x) { return (1 + x / std::hypot(x, c.smooth)) / 2; };
+        const double s = u(z - 1) + u(-z - 1);
+        EXPECT_NEAR(r * r + s * s, 0.25, 1e-13);
+        EXPECT_NEAR(r * r1 + s * (du(z - 1) - du(-z - 1)) * z1, 0, 1e-12);
+    }
+    const auto kg_of = [](double smooth) {
+        return bending_energy(meridian(Capsule{0.5, 2, smooth}), with_gradients(bending(1), 1)).energy_kg;
+    };
+    EXPECT_GT(kg_of(0.1), 1.5 * kg_of(0.2));  // as 1/smooth in the end
+    const Outcome o =
+        run_case(case_of("tier = \"axisym\"\n[energy]\nk20 = 0.5\nkg = 0.02\n[shape]\nkind = \"capsule\"\nradius = "
+                         "0.5\nlength = 2\nsmooth = "
+                         "0.2\n[model]\nkind = \"stokes\"\n[time]\nend = 0.01\n[accuracy]\nenergy = 1e-4\n"));
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_LT(o.last("energy_kg"), o["energy_kg"].front());
 }
 
 }  // namespace gradient_test
