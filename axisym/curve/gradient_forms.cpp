@@ -1,7 +1,6 @@
 #include "axisym/curve/gradient_forms.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "axisym/curve/curve_local.hpp"
 #include "axisym/splines/pack.hpp"
@@ -43,28 +42,12 @@ struct GradientForms::Local : CurveLocal {
     }
 };
 
-GradientForms::GradientForms(const CurveSpace& space) : space_(space) {
-    const SplineSpace& splines = space.splines();
-    if (splines.smoothness() < 2) throw std::invalid_argument("the gradient term needs splines of smoothness 2");
-    third_.assign(static_cast<std::size_t>(splines.elements()) * splines.groups(), Third{});
-    double values[4 * wide];
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            Third& to = third_[e * splines.groups() + g];
-            for (int q = 0; q < lanes; ++q) {
-                splines.splines(e, splines.basis(e, g).z[q], 3, values);
-                for (int a = 0; a < splines.width(); ++a)
-                    to.by_point[a][q] = to.by_spline[q][a] = values[3 * splines.width() + a];
-            }
-        }
-}
-
 template <class Visit>
 void GradientForms::each_group(const double* x, const Visit& visit) const {
     const SplineSpace& splines = space_.splines();
     for (int e = 0; e < splines.elements(); ++e)
         for (int g = 0; g < splines.groups(); ++g) {
-            const Third& third = third_[e * splines.groups() + g];
+            const Third& third = third_.at(e, g);
             visit(e, splines.basis(e, g), third, Local(space_, third, e, g, x));
         }
 }

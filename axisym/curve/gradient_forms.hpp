@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "axisym/splines/curve_space.hpp"
+#include "axisym/splines/third_derivatives.hpp"
 
 namespace tubule::axisym {
 
 class GradientForms {
 public:
     // Keeps the space, which must outlive it. Throws std::invalid_argument where its smoothness is 1.
-    explicit GradientForms(const CurveSpace& space);
+    explicit GradientForms(const CurveSpace& space) : space_(space), third_(space.splines()) {}
 
     // Of the whole cell or period. `stiffness`, if given, receives 2 INT dS/g^6 for each element, by which an error of
     // the third derivative along the normal counts.
@@ -33,17 +34,14 @@ public:
     double stretch_slope(const double* x) const;
 
 private:
-    struct Third {  // third derivatives of the active splines at a group of points, as in SplineSpace::Basis
-        alignas(32) double by_point[SplineSpace::max_width][SplineSpace::lanes];
-        alignas(32) double by_spline[SplineSpace::lanes][SplineSpace::max_width];
-    };
+    using Third = ThirdDerivatives::Group;
     struct Local;
     Eigen::VectorXd by_rise(double weight, const double* x) const;
     template <class Visit>
     void each_group(const double* x, const Visit& visit) const;
 
     const CurveSpace& space_;
-    std::vector<Third> third_;
+    ThirdDerivatives third_;
 };
 
 }  // namespace tubule::axisym

@@ -83,17 +83,6 @@ J functional_density(const Bending& bending, const std::optional<Formula>& poten
 
 }  // namespace
 
-namespace {
-
-std::vector<double> third_derivatives(const SplineSpace& splines, int element, double s) {
-    double values[4 * SplineSpace::max_width];
-    splines.splines(element, s, 3, values);
-    const double* third = values + static_cast<std::ptrdiff_t>(3) * splines.width();
-    return {third, third + splines.width()};
-}
-
-}  // namespace
-
 // dW/dnu - H W: the derivative of INT W dS along the normal displacement w is the integral of this times w.
 double ModeStability::slope_along_normal(const Formula& W, double P, const Point& p) {
     using Slope = Jet<double, 2, 1>;
@@ -116,7 +105,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
     const Vector n_z = space.z().project([&](double s) { return normal(s)[1]; });
     std::vector<std::array<double, 4>> first_variation;  // by w, w_s, w_ss, w_sss
     const Bending bending = with_M(problem.bending, shape.observed.M);
-    if (bending.kg != 0) gradients_.emplace();
+    if (bending.kg != 0) gradients_.emplace(), third_.emplace(splines);
     const std::optional<Formula> potential = potential_density(bending.potentials);
     if (problem.beads) beads_.emplace(bead_forms(space, problem));
     for (int e = 0; e < splines.elements(); ++e)
@@ -149,7 +138,6 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
                 }
                 first_variation.push_back({density.d[W][q], density.d[W_s][q], density.d[W_ss][q], 0});
                 if (gradients_) {
-                    third_.push_back(third_derivatives(splines, e, b.z[q]));
                     const auto& more = gradients_->first_variation(points_.size());
                     for (int k = 0; k < 4; ++k) first_variation.back()[k] += bending.kg * more[k];
                 }
@@ -166,12 +154,11 @@ void ModeStability::add_gradients(int element, int group, const Vector& n_r, con
     const auto& b = space.splines().basis(element, group);
     GradientModes::Derivatives r, z, along_r, along_z;
     for (int q = 0; q < lanes; ++q) {
-        double values[4 * SplineSpace::max_width];
-        space.splines().splines(element, b.z[q], 3, values);
+        const auto& third = third_->at(element, group).by_spline[q];
         const auto derivative = [&](const SplineSpace& field, const double* c, int k) {
             double sum = 0;
             for (int a = 0; a < width; ++a)
-                sum += values[k * width + a] * field.signs(element)[a] * c[field.dofs(element)[a]];
+                sum += (k < 3 ? b.by_spline[q][k][a] : third[a]) * field.signs(element)[a] * c[field.dofs(element)[a]];
             return sum;
         };
         for (int k = 0; k < 4; ++k) {
@@ -194,13 +181,14 @@ void ModeStability::set_force(const std::vector<std::array<double, 4>>& first_va
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
         const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
+        const int group = static_cast<int>(k) % per_element / lanes;
+        const auto& b = splines.basis(e, group);
         const auto& d = first_variation[k];
         for (int a = 0; a < width; ++a) {
             const int i = field.dofs(e)[a];
             const double sign = field.signs(e)[a], f0 = sign * b.by_spline[q][0][a];
             load[i] -= p.weight * (d[0] * f0 + sign * (d[1] * b.by_spline[q][1][a] + d[2] * b.by_spline[q][2][a]));
-            if (gradients_) load[i] -= p.weight * d[3] * sign * third_[k][a];
+            if (gradients_) load[i] -= p.weight * d[3] * sign * third_->at(e, group).by_spline[q][a];
             for (int c = 0; c < width; ++c)
                 mass(field.dofs(e)[c], i) +=
                     p.weight * p.r * p.g * p.along * f0 * field.signs(e)[c] * b.by_spline[q][0][c];
@@ -341,7 +329,8 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
         const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const auto& b = field.basis(e, static_cast<int>(k) % per_element / lanes);
+        const int group = static_cast<int>(k) % per_element / lanes;
+        const auto& b = field.basis(e, group);
         const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
         const double dS = p.weight * p.r * p.g, n2 = p.along * p.along;
         Eigen::Matrix4d C = Eigen::Matrix4d::Zero();
@@ -353,7 +342,7 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
         C(1, 2) = C(2, 1) = Q(W_s, W_ss);
         C(2, 2) = Q(W_ss, W_ss);
         if (gradients_) C += problem_.bending.kg * gradients_->second_variation(k, m);
-        const auto third = [&](int a) { return gradients_ ? third_[k][a] : 0.0; };
+        const auto third = [&](int a) { return third_ ? third_->at(e, group).by_spline[q][a] : 0.0; };
         // Rigid motions as normal displacements over cos(m theta).
         const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, p.z * p.normal_r - p.r * p.normal_z};
         for (int a = 0; a < width; ++a) {

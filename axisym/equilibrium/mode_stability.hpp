@@ -12,6 +12,7 @@
 
 #include "axisym/equilibrium/equilibrium.hpp"
 #include "axisym/equilibrium/gradient_modes.hpp"
+#include "axisym/splines/third_derivatives.hpp"
 #include "common/model/model.hpp"
 
 namespace tubule::axisym {
@@ -82,7 +83,7 @@ private:
     std::optional<BeadForms> beads_;
     std::vector<Point> points_;  // element by element
     std::optional<GradientModes> gradients_;
-    std::vector<std::vector<double>> third_;  // of each point, third derivatives of the active splines, with gradients_
+    std::optional<ThirdDerivatives> third_;  // with gradients_
 };
 
 // For m = 0 ... last.

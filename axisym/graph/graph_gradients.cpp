@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
 
 #include "axisym/splines/pack.hpp"
 #include "common/geometry/jet.hpp"
@@ -30,26 +29,12 @@ Jet<Pack, 4, Order> density(const Radii& at) {
 
 }  // namespace
 
-GraphGradients::GraphGradients(const SplineSpace& space) : space_(space), images_(space.cell().images()) {
-    if (space.smoothness() < 2) throw std::invalid_argument("the gradient term needs splines of smoothness 2");
-    third_.assign(static_cast<std::size_t>(space.elements()) * space.groups(), Third{});
-    double values[4 * wide];
-    for (int e = 0; e < space.elements(); ++e)
-        for (int g = 0; g < space.groups(); ++g)
-            for (int q = 0; q < lanes; ++q) {
-                Third& to = third_[e * space.groups() + g];
-                space.splines(e, space.basis(e, g).z[q], 3, values);
-                for (int a = 0; a < space.width(); ++a)
-                    to.by_point[a][q] = to.by_spline[q][a] = values[3 * space.width() + a];
-            }
-}
-
 template <class Visit>
 void GraphGradients::each_group(const double* x, const Visit& visit) const {
     for (int e = 0; e < space_.elements(); ++e)
         for (int g = 0; g < space_.groups(); ++g) {
             const auto& basis = space_.basis(e, g);
-            const Third& third = third_[e * space_.groups() + g];
+            const ThirdDerivatives::Group& third = third_.at(e, g);
             Radii r{Pack(0.0), Pack(0.0), Pack(0.0), Pack(0.0)};
             for (int a = 0; a < space_.width(); ++a) {
                 const double c = x[space_.dofs(e)[a]];

@@ -4,18 +4,18 @@
 
 #include <vector>
 
-#include "axisym/splines/spline_space.hpp"
+#include "axisym/splines/third_derivatives.hpp"
 
 namespace tubule::axisym {
 
 class GraphGradients {
 public:
     // Keeps the space, which must outlive it. Throws std::invalid_argument where its smoothness is 1.
-    explicit GraphGradients(const SplineSpace& space);
+    explicit GraphGradients(const SplineSpace& space) : space_(space), images_(space.cell().images()), third_(space) {}
 
-    // Over the whole period. `stiffness`, if given, receives for each element 2 INT dS/g^8 times `weight`: what an
-    // error of r''' costs, as its part along the normal is 1/g of it.
+    // Over the whole period.
     double value(const double* x) const;
+    // Of each element 2 INT dS/g^8 times `weight`: what an error of r''' costs, whose part along the normal is 1/g of it.
     std::vector<double> stiffness(double weight, const double* x) const;
     // The gradient, added to space.size() numbers.
     void add_gradient(double weight, const double* x, double* out) const;
@@ -25,16 +25,12 @@ public:
     double stretch_slope(const double* x) const;
 
 private:
-    struct Third {  // third derivatives of the active splines at a group of points, as in SplineSpace::Basis
-        alignas(32) double by_point[SplineSpace::max_width][SplineSpace::lanes];
-        alignas(32) double by_spline[SplineSpace::lanes][SplineSpace::max_width];
-    };
     template <class Visit>
     void each_group(const double* x, const Visit& visit) const;
 
     const SplineSpace& space_;
     double images_;
-    std::vector<Third> third_;
+    ThirdDerivatives third_;
 };
 
 }  // namespace tubule::axisym

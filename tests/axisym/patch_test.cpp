@@ -316,7 +316,7 @@ TEST(Patches, fluidsContinueWithTheirVelocity) {
     EXPECT_NEAR(second["kinetic_energy"].front(), first.last("kinetic_energy"), 1e-3 * first.last("kinetic_energy"));
     EXPECT_NEAR(second["free_energy"].front(), first.last("free_energy"), 1e-5 * first.summary.reference_energy);
 
-    std::get<ResultFrame>(next.shape).modes = {{.amplitude = 0.1, .n = 2}};
+    std::get<ResultFrame>(next.shape).modes = {{.amplitude = 0.1, .l = {}, .n = 2}};
     const std::string message = test::message_of<CaseError>([&] { run_case(next); });
     EXPECT_NE(message.find("must be absent: modes and noise are those of closed cells"), std::string::npos) << message;
 }
