@@ -46,8 +46,8 @@ struct CurveObservation {
     // Smallest principal symbol f_HH + 2 f_HK x + f_KK x^2: for x = kappa_theta, and for all x between the principal
     // curvatures: theory.md (2.14).
     double symbol = std::numeric_limits<double>::infinity(), s_symbol = 0, symbol_3d = symbol;
-    // With kg > 0 the symbol does not matter. Where it is negative, waves shorter than the scale sqrt(2 kg/|symbol|)
-    // are held by the gradient term alone: the longest element over that scale.
+    // With kg > 0 the symbol stays infinite. Where f has a negative one, waves grow that are longer than 2 pi
+    // sqrt(2 kg/|symbol|): the largest ratio of an element to that root.
     double coarse = 0, s_coarse = 0;
     PotentialObservation potential;  // its energy is part of `energy`
     FormulaDomain::Margin domain;    // of the energy's formula; its place is s

@@ -1,6 +1,6 @@
-// The gradient term of a profile curve, G = INT |grad H|^2 dS, theory.md (2.25), and its derivatives in the
-// coefficients of the curve, to be added to those of CurveForms. Its curves have continuous curvature: splines of
-// smoothness 2 at least, whose third derivatives it needs.
+// The gradient energy INT |grad H|^2 dS of a profile curve, theory.md (2.25), with its first and second derivatives in
+// the coefficients of the curve; CurveForms adds them, times kg. The curvature must be continuous: splines of
+// smoothness 2 at least.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@ public:
     // Keeps the space, which must outlive it. Throws std::invalid_argument where its smoothness is 1.
     explicit GradientForms(const CurveSpace& space) : space_(space), third_(space.splines()) {}
 
-    // Of the whole cell or period. `stiffness`, if given, receives 2 INT dS/g^6 for each element, by which an error of
-    // the third derivative along the normal counts.
+    // Integrates over the whole cell or period. `stiffness`, if given, receives 2 INT dS/g^6 for each element: half of
+    // it times the square of an error of the third normal derivative is the energy that this error costs.
     double value(const double* x, std::vector<double>* stiffness = nullptr) const;
     // The gradient, added to space.size() numbers.
     void add_gradient(double weight, const double* x, double* out) const;

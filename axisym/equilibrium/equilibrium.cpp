@@ -391,7 +391,7 @@ std::optional<std::pair<Stop, std::string>> verdict(const StationaryProblem& pro
                               ? fmt::format("the error of the energy is still {:.1e}", out.estimated_error)
                               : "the error of the energy is not known yet";
     if (out.observed.coarse > 1)
-        unknown = "elements are longer than the scale of waves that the gradient term alone holds";
+        unknown = "elements are longer than sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|), too long for waves that grow";
     else if (out.estimated_error <= settings.accuracy) {
         if (const auto where = self_intersection(*out.space, out.x)) {
             const CurveSample p = out.space->evaluate(out.x, (*where)[0]);

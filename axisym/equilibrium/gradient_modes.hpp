@@ -16,7 +16,7 @@ public:
     using Derivatives = std::array<Pack, 4>;
     void add_group(const Derivatives& r, const Derivatives& z, const Derivatives& n_r, const Derivatives& n_z);
 
-    // Of the point with this number, in the order of the groups, per ds and dtheta. The first variation is that of
+    // The variations at the point with this number, in the order of the groups, per ds and dtheta. The first is that of
     // m = 0; the second is averaged over theta like cos^2(m theta).
     const std::array<double, 4>& first_variation(std::size_t point) const { return points_[point].first; }
     Eigen::Matrix4d second_variation(std::size_t point, int m) const;

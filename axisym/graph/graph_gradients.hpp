@@ -1,5 +1,5 @@
-// The gradient term of a graph, G = INT |grad H|^2 dS, theory.md (2.25), and its derivatives in the coefficients, to be
-// added to those of Forms: GradientForms for the curve z = s.
+// The gradient energy INT |grad H|^2 dS of a graph, theory.md (2.25), with its first and second derivatives in the
+// coefficients; Forms adds them, times kg. GradientForms is the same for curves.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,8 @@ public:
 
     // Over the whole period.
     double value(const double* x) const;
-    // Of each element 2 INT dS/g^8 times `weight`: what an error of r''' costs, whose part along the normal is 1/g of it.
+    // Returns `weight` 2 INT dS/g^8 for each element: half of it times the square of an error of r''' is the energy
+    // that this error costs (its normal part is 1/g of it).
     std::vector<double> stiffness(double weight, const double* x) const;
     // The gradient, added to space.size() numbers.
     void add_gradient(double weight, const double* x, double* out) const;

@@ -311,7 +311,9 @@ void keys(Keys& k, Expect& expect, double end) {
 // Parts of the energy are expected of terms that the case has.
 template <class Keys>
 void check_expected_terms(Keys& k, const Case& c) {
-    const std::vector<std::string> names = term_names(c.energy);
+    std::vector<std::string> names = term_names(c.energy);
+    const bool varies = c.equilibrium && c.equilibrium->branch.parameter == vary_kg;
+    if (c.energy.kg > 0 || varies) names.emplace_back("kg");
     for (const Expectation& value : c.expect.values)
         k.check("expect", [&]() -> std::string {
             const std::string_view part = energy_part(value.series);

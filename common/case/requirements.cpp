@@ -65,7 +65,7 @@ const Property tube{"a tube", [](P p) { return may_have_period(p.shape); }},
     no_alpha{"an energy without energy.alpha", [](P p) { return !p.energy.alpha; }},
     no_potential{"a case without energy.potential", [](P p) { return p.energy.potentials.empty(); }},
     closed{"a closed surface", [](P p) { return !is_tube(p.shape); }},
-    whole{"a closed surface or a tube", [](P p) { return !may_have_rim(p.shape); }},
+    whole{"a closed surface or a tube", [](P p) { return !std::holds_alternative<Patch>(p.shape); }},
     smooth_shape{"an initial shape whose curvature does not jump (a capsule needs shape.smooth)",
                  [](P p) {
                      const auto* capsule = std::get_if<Capsule>(&p.shape);

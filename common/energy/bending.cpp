@@ -56,6 +56,7 @@ std::string term_label(const EnergyTerm& term) {
 }
 
 std::string term_label(std::string_view name) {
+    if (name == "kg") return "k_g|\\nabla H|^2";
     std::string label = "k f(H,K)";
     bool listed = name == "formula";
     for_each_bending_term([&](std::size_t, const auto& term) {

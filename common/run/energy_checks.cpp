@@ -58,8 +58,8 @@ std::string key_of_ill_posed(const Problem& c) {
 
 std::string unresolved_waves(const std::string& what, double times) {
     return fmt::format(
-        "{} {:.2g} times sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|), the scale of waves that the gradient term alone "
-        "holds",
+        "{} {:.2g} times sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|), the length below "
+        "which only the gradient term damps waves",
         what, times);
 }
 

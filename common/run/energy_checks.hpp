@@ -16,7 +16,8 @@ CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, con
 std::string key_of_formula(const Bending& energy);
 
 // The stop of a run that comes too near to where the formula is not defined.
-// Of a guard: `what`, "an element is" say, so many times too long for the waves that the gradient term alone holds.
+// The message of a guard: `what`, for example "an element near s = 0.3 is", exceeds by the factor `times` the length
+// that resolves the shortest growing wave where kg > 0: theory.md (2.26).
 std::string unresolved_waves(const std::string& what, double times);
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 

@@ -72,7 +72,8 @@ std::vector<std::string> expectable_series() {
 std::string_view energy_part(std::string_view name) {
     const SeriesEntry* entry = find_series(name);
     const std::string_view stem = SeriesName("energy_<kl>").entry().stem();
-    const bool part = entry && (entry->name == energy_terms || entry->name == "energy_formula");
+    const bool part =
+        entry && (entry->name == energy_terms || entry->name == "energy_formula" || entry->name == "energy_kg");
     return part ? name.substr(stem.size()) : std::string_view();
 }
 

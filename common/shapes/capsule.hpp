@@ -16,12 +16,12 @@ namespace tubule {
 struct Capsule {
     static constexpr const char* kind = "capsule";
     double radius = 0.5, length = 2;
-    double smooth =
-        0;  // > 0: the length over which the curvature changes from that of the cylinder to that of the caps
+    // > 0: the length over which the curvature changes from that of the cylinder to that of the caps, at most radius/2.
+    double smooth = 0;
 };
 
 // Smooth capsules: x^2 + y^2 + over(z)^2 = radius^2, where over(z), for smooth = 0 the part of |z| beyond length/2, is
-// u(z - length/2) + u(-z - length/2) with u(x) = (x + sqrt(x^2 + smooth^2))/2. Above the plane z = 0 and below it.
+// u(z - length/2) + u(-z - length/2) with u(x) = (x + sqrt(x^2 + smooth^2))/2. Returns the two terms at z.
 template <class S>
 std::array<S, 2> over(const Capsule& c, const S& z) {
     using std::sqrt;
@@ -106,7 +106,8 @@ void keys(Keys& k, Capsule& capsule) {
     k.number("radius", capsule.radius, {.above = 0}, k.required);
     k.number("length", capsule.length, {.above = 0}, k.required);
     k.number("smooth", capsule.smooth, {.from = 0});
-    k.check("smooth", [&] { return capsule.smooth > capsule.radius ? "must be at most shape.radius" : ""; });
+    k.check("smooth",
+            [&] { return 2 * capsule.smooth > capsule.radius ? "must be at most half of shape.radius" : ""; });
 }
 
 }  // namespace tubule

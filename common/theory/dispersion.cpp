@@ -337,6 +337,9 @@ std::optional<StableTensions> stable_tensions(const UniformTube& tube, int m) {
         if (value(-z0) < -rounding * size) return std::nullopt;
         if (value(-z0) <= rounding * size) bound(-z0, -slope(-z0), true, m == 0);
     }
+    // Both are one number where a wave is neutral at every other tension.
+    const double apart = out.lowest - out.highest;
+    if (apart > 1e-12 * (std::abs(out.lowest) + std::abs(out.highest) + std::abs(P.q2))) return std::nullopt;
     out.lowest += tube.tension - T, out.highest += tube.tension - T;
     return out;
 }

@@ -11,6 +11,7 @@
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_mesh.hpp"
 #include "common/case/read.hpp"
+#include "common/result/start_frame.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "common/theory/dispersion.hpp"
 #include "tests/axisym/runs.hpp"
@@ -67,7 +68,7 @@ TEST(Gradients, formsHaveTheirDerivatives) {
 }
 
 // INT |grad H|^2 dS of a torus and an ellipsoid by the trapezoidal rule in their own angles, exact to rounding; errors
-// of the splines fall with the powers 2 (degree - 2): 2, 6 and 10.
+// of the splines are of order 2 (degree - 2): 2, 6 and 10.
 TEST(Gradients, energiesOfToriAndEllipsoids) {
     constexpr int points = 4000;
     double torus = 0, ellipsoid = 0;
@@ -212,8 +213,7 @@ TEST(Gradients, unresolvedWavesStopARun) {
         c.discretisation.parametrisation = how;
         const Outcome o = run_case(c);
         EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost);
-        EXPECT_NE(o.summary.stop.message.find("the scale of waves that the gradient term alone holds"),
-                  std::string::npos)
+        EXPECT_NE(o.summary.stop.message.find("which only the gradient term damps waves"), std::string::npos)
             << o.summary.stop.message;
     }
 }
@@ -266,6 +266,36 @@ TEST(Gradients, smoothCapsules) {
                          "0.2\n[model]\nkind = \"stokes\"\n[time]\nend = 0.01\n[accuracy]\nenergy = 1e-4\n"));
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
     EXPECT_LT(o.last("energy_kg"), o["energy_kg"].front());
+    EXPECT_NE(
+        test::message_of([] {
+            case_of(
+                "tier = \"axisym\"\n[energy]\nk20 = 1\n[shape]\nkind = \"capsule\"\nradius = 0.5\nlength = 2\nsmooth = "
+                "0.3\n[time]\nend = 1\n");
+        }).find("shape.smooth must be at most half of shape.radius"),
+        std::string::npos);
+}
+
+// A frame of a result begins a run with the gradient term; one of a patch is refused.
+TEST(Gradients, framesAsInitialShapes) {
+    const auto begun = [](const std::string& first, const std::string& set) {
+        const Outcome before = run_case(case_of(first));
+        Result result;
+        result.frames = {before.log.frames.back()};
+        Case c = case_of(
+            "tier = \"axisym\"\n[energy]\nk20 = 0.5\nkg = 0.1\n[shape]\nkind = \"result\"\npath = \"x.hdf\"\nframe = "
+            "0\n[time]\nend = 0.001\n" +
+            set);
+        c.input = frame_as_input(std::get<ResultFrame>(c.shape), result);
+        return run_case(c);
+    };
+    const std::string head = "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[time]\nend = 0.001\n[shape]\n";
+    const Outcome o = begun(head + "kind = \"ellipsoid\"\na = 1\nb = 1\nc = 1.4\n", "");
+    EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_GT(o.last("energy_kg"), 0.1);
+    EXPECT_NE(test::message_of([&] {
+                  begun(head + "kind = \"patch\"\nradius = 1\nheight = 0.3\n", "");
+              }).find("energy.kg must be 0 where the shape is a patch"),
+              std::string::npos);
 }
 
 }  // namespace gradient_test

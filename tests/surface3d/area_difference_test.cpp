@@ -15,8 +15,6 @@
 namespace tubule::surface3d {
 namespace area_difference_test {
 
-constexpr double step = 1e-3;
-
 Bending with_alpha(double alpha, double M0) {
     Bending out{.k = {0.5, 0.03, 0.1}, .H0 = -0.6};
     out.alpha = alpha, out.M0 = M0;
@@ -47,29 +45,9 @@ TEST(AreaDifference, MOfExactShapes) {
     }
 }
 
-// What a step of a fluid at rest has on this mesh.
-StepSystem system_on(const CurvedMesh& mesh, const Bending& bending, const MotionLaw& law) {
-    const SurfaceSpace space(mesh);
-    const MotionUnknowns unknowns(mesh, law, bending);
-    StepBase base;
-    base.mesh = &mesh, base.fields = fields_of(mesh), base.te = 1;
-    base.M = integral(space, mesh, base.fields.H);
-    base.displacement = base.mesh_velocity = VectorField::Zero(3, mesh.size());
-    base.velocity = base.past = Eigen::VectorXd::Zero(3 * mesh.size());
-    StepSystem system;
-    assemble(space, unknowns, law, bending, base, system);
-    return system;
-}
-
-// d/ds of quantity(mesh moved by s v), fourth order in the step.
 template <class Quantity>
 double rate_of(const CurvedMesh& mesh, const VectorField& v, const Quantity& quantity) {
-    const auto at = [&](double s) {
-        CurvedMesh moved = mesh;
-        for (int i = 0; i < mesh.size(); ++i) moved.nodes[i] += s * v.col(i);
-        return quantity(moved);
-    };
-    return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step);
+    return rate_along([&](double s) { return moved_mesh(mesh, v, s); }, quantity);
 }
 
 TEST(AreaDifference, theForceApproachesTheRateOfTheEnergy) {
@@ -83,7 +61,7 @@ TEST(AreaDifference, theForceApproachesTheRateOfTheEnergy) {
         const CurvedMesh mesh = mesh_of(wavy, icosphere(2 << i), 4);
         const VectorField v = smooth_at(mesh);
         const Eigen::VectorXd flat = Eigen::MatrixXd(v.transpose()).reshaped();
-        const StepSystem system = system_on(mesh, bending, law);
+        const StepSystem system = system_at_rest(mesh, bending, law);
         const double energy = rate_of(mesh, v, [&](const CurvedMesh&m) { return observed(m, bending).energy; }),
                      M = rate_of(mesh, v, [&](const CurvedMesh&m) { return observed(m, bending).M; });
         of_energy[i] = std::abs(system.force.head(flat.size()).dot(flat) + energy) / std::abs(energy);
@@ -104,21 +82,14 @@ TEST(AreaDifference, theForceOnAPeriodIsARate) {
     for (const int i : {0, 1}) {
         const CurvedMesh mesh =
             tube_mesh({.radius = 1, .length = 4, .modes = {{0.2, 1, 0}, {0.1, 1, 2}}}, 6 << i, 8 << i, 4);
-        const auto stretched_by = [&](double s, const auto& quantity) {
-            CurvedMesh m = mesh;
-            for (Eigen::Vector3d& x : m.nodes) x.z() *= 1 + s;
-            m.period *= 1 + s;
-            const Observables o = observed(m, bending);
-            return quantity(o);
-        };
         const auto rate = [&](const auto& quantity) {
-            const auto at = [&](double s) { return stretched_by(s, quantity); };
-            return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step);
+            return rate_along([&](double s) { return stretched_mesh(mesh, s); },
+                              [&](const CurvedMesh& m) { return quantity(observed(m, bending)); });
         };
         const double energy = rate([](const Observables&o) { return o.energy; }),
                      M = rate([](const Observables&o) { return o.M; });
         const double force = Motion(mesh, {}, bending).measures().force,
-                     of_M = system_on(mesh, bending, motion_law(open)).stretch.M;
+                     of_M = system_at_rest(mesh, bending, motion_law(open)).stretch.M;
         error[i] = std::max(std::abs(force / (energy / mesh.period) - 1), std::abs(of_M / M - 1));
     }
     EXPECT_LT(error[1], 1e-3);

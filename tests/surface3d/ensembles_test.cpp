@@ -210,18 +210,9 @@ Model stretching_model(ModelKind kind, double force, bool area, bool volume) {
     return out;
 }
 
-CurvedMesh stretched_mesh(CurvedMesh mesh, double by) {
-    for (Eigen::Vector3d& x : mesh.nodes) x.z() *= 1 + by;
-    mesh.period *= 1 + by;
-    return mesh;
-}
-
-// d/ds of quantity(mesh stretched by s) at s = 0, fourth order in the step.
 template <class Quantity>
 double rate_of_stretch(const CurvedMesh& mesh, const Quantity& quantity) {
-    const double s = 1e-3;
-    const auto at = [&](double x) { return quantity(stretched_mesh(mesh, x)); };
-    return (8 * (at(s) - at(-s)) - (at(2 * s) - at(-2 * s))) / (12 * s);
+    return rate_along([&](double s) { return stretched_mesh(mesh, s); }, quantity);
 }
 
 TEST(FreePeriod, ItsTermsAreDerivatives) {

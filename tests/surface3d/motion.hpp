@@ -8,6 +8,7 @@
 #include "common/shapes/tube.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
+#include "surface3d/motion/motion_forms.hpp"
 #include "surface3d/motion/motion_measures.hpp"
 #include "surface3d/motion/schemes/time_scheme.hpp"
 
@@ -48,6 +49,38 @@ struct Motion {
     MovingSurface& surface;
     MotionState state;
 };
+
+// What a step from rest has on this mesh.
+inline StepSystem system_at_rest(const CurvedMesh& mesh, const Bending& bending, const MotionLaw& law) {
+    const SurfaceSpace space(mesh);
+    const MotionUnknowns unknowns(mesh, law, bending);
+    StepBase base;
+    base.mesh = &mesh, base.te = 1;
+    base.fields = motion_fields(space, mesh, Projection(space, mesh), bending.kg);
+    base.M = integral(space, mesh, base.fields.H);
+    base.displacement = base.mesh_velocity = VectorField::Zero(3, mesh.size());
+    base.velocity = base.past = Eigen::VectorXd::Zero(3 * mesh.size());
+    StepSystem system;
+    assemble(space, unknowns, law, bending, base, system);
+    return system;
+}
+
+// d/ds of quantity(moved(s)) at s = 0, moved(s) being a mesh; fourth order in the step.
+template <class Moved, class Quantity>
+double rate_along(const Moved& moved, const Quantity& quantity) {
+    constexpr double step = 1e-3;
+    const auto at = [&](double s) { return quantity(moved(s)); };
+    return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step);
+}
+inline CurvedMesh moved_mesh(CurvedMesh mesh, const VectorField& v, double s) {
+    for (int i = 0; i < mesh.size(); ++i) mesh.nodes[i] += s * v.col(i);
+    return mesh;
+}
+inline CurvedMesh stretched_mesh(CurvedMesh mesh, double by) {
+    for (Eigen::Vector3d& x : mesh.nodes) x.z() *= 1 + by;
+    mesh.period *= 1 + by;
+    return mesh;
+}
 
 // INT f(x) dS.
 template <class F>

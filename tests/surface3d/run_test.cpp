@@ -244,7 +244,7 @@ TEST(SurfaceRun, ShapesThatCannotBeMade) {
               "points");
 }
 
-// A patch, which a frame of tier axisym may be, is no closed surface.
+// A frame of tier axisym may be a patch: it has no closed surface.
 TEST(SurfaceRun, RefusesAPatch) {
     Record frame;
     frame.kind = RecordKind::equilibrium, frame.numbers = {{"length", 0.0}};

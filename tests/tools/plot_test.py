@@ -202,6 +202,7 @@ class Labels(unittest.TestCase):
     def test_formulas_and_numbers(self):
         self.assertEqual(labels.formula("k_{20}(H-H_0)^2"), "k\u2082\u2080(H\u2212H\u2080)\u00b2")
         self.assertEqual(labels.formula("E_{42}"), "E\u2084\u2082")
+        self.assertEqual(labels.formula("k_g|\\nabla H|^2"), "kg|\u2207H|\u00b2")
         found = [labels.power(value, 2) for value in (0, 0.0123, 4567, 4.26e-5, -1.5e7)]
         self.assertEqual(found, ["0", "0.012", "4600", "4.3\u00b710\u207b\u2075", "\u22121.5\u00b710\u2077"])
 

@@ -255,6 +255,40 @@ TEST(Thresholds, pearling) {
     EXPECT_EQ(stable->q_highest, 0);
 }
 
+TEST(Thresholds, withTheGradientTerm) {
+    // theory.md (5.28) by samples: no wave grows between the two tensions, some wave does at each side of them; and
+    // none is given where every tension lets some wave grow.
+    const auto grows = [](UniformTube tube, int m, double tension) {
+        tube.tension = tension;
+        const Stiffness G = stiffness(tube, m);
+        for (double q = m == 0 ? 1e-3 : 0; q < 20; q += 1e-3)
+            if (G(q) < -1e-9) return true;
+        return false;
+    };
+    int windows = 0, none = 0;
+    for (const double k20 : {-0.5, 0.3})
+        for (const double k42 : {-0.4, 0.0, 0.2})
+            for (const double kg : {0.02, 0.3})
+                for (int m = 0; m <= 2; ++m) {
+                    UniformTube tube{bending(k20, -1, 0.02, k42), 0.9, 0};
+                    tube.energy.kg = kg;
+                    const auto stable = stable_tensions(tube, m);
+                    if (!stable) {
+                        ++none;
+                        for (double T = -30; T < 30; T += 0.25) EXPECT_TRUE(grows(tube, m, T)) << T << " " << m;
+                        continue;
+                    }
+                    ++windows;
+                    EXPECT_TRUE(grows(tube, m, stable->lowest - 1e-3)) << m << " " << k20 << " " << k42 << " " << kg;
+                    EXPECT_FALSE(grows(tube, m, stable->lowest + 1e-4)) << m << " " << k20 << " " << k42 << " " << kg;
+                    if (std::isfinite(stable->highest)) {
+                        EXPECT_TRUE(grows(tube, m, stable->highest + 1e-3));
+                    }
+                }
+    EXPECT_GT(windows, 10);
+    EXPECT_GT(none, 1);
+}
+
 TEST(Thresholds, tubeAtItsPreferredRadius) {
     // H0 = -1/R: without k42 the wave q R = 1 is neutral; k42 > 0 lifts it, k42 < 0 lets it grow. The gradient flow is
     // sigma0 = 0, Sigma = 0.

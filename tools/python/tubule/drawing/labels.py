@@ -110,7 +110,7 @@ def wrapped(words, width):
 def formula(mathtext):
     """k_{20}(H-H_0)^2 with real sub- and superscripts, so that it is plain text in an SVG."""
     out, table, braced = [], None, False
-    for char in mathtext:
+    for char in mathtext.replace("\\nabla ", "\u2207"):
         if char in "_^":
             table = SUBSCRIPT if char == "_" else SUPERSCRIPT
         elif char == "{":

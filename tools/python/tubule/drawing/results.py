@@ -167,7 +167,7 @@ class Result:
     @property
     def terms(self):
         """Names of the energy terms in the series, "20" for energy_20."""
-        return [name[7:] for name in self.series if re.fullmatch(r"energy_(\d+(_\d+)?|formula)", name)]
+        return [name[7:] for name in self.series if re.fullmatch(r"energy_(\d+(_\d+)?|formula|kg)", name)]
 
 
 BEST_COMPRESSION = 1032  # of deflate
