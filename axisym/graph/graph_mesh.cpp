@@ -198,6 +198,7 @@ namespace {
 // Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
 constexpr double start_margin = 1.0 / 4;  // initial defect / defect at which to remesh
 constexpr int fewest_elements = 3;
+constexpr double coarsest_at_first = 0.5;  // of Observation::coarse, at which a run ends when it is 1
 
 SplineSpace space_of(const Cell& cell, std::vector<double> breaks, const Problem& c) {
     const int order = c.discretisation.order;
@@ -249,15 +250,17 @@ std::vector<double> initial_breaks(const Problem& c, const GraphSettings& settin
         const Forms forms(space, c.energy, graph_loads(c));
         const Eigen::VectorXd x = space.project(shape);
         const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
-        const FormulaDomain::Margin domain = forms.observe(x.data(), rest.data()).domain;
-        require_defined(c, domain, fmt::format("z = {:.6g}", domain.place));
+        const Observation o = forms.observe(x.data(), rest.data());
+        require_defined(c, o.domain, fmt::format("z = {:.6g}", o.domain.place));
         const double allowed = settings.defect * reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
         if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return breaks;
         const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);
         const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
-        if (lost < allowed * start_margin) return breaks;
+        if (lost < allowed * start_margin && o.coarse <= coarsest_at_first) return breaks;
+        const double for_waves = std::min(o.coarse / coarsest_at_first * space.elements(), most_graph_elements + 1.0);
         std::vector<double> next =
-            adapted_breaks(space, defect, allowed * start_margin / 2, fewest_elements, most_graph_elements + 1);
+            adapted_breaks(space, defect, allowed * start_margin / 2,
+                           std::max(fewest_elements, static_cast<int>(std::ceil(for_waves))), most_graph_elements + 1);
         if (static_cast<int>(next.size()) > most_graph_elements + 1) return breaks;
         breaks = std::move(next);
     }

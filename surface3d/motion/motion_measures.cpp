@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/energy/principal_symbol.hpp"
 #include "surface3d/motion/axial_force.hpp"
 
 namespace tubule::surface3d {
@@ -71,20 +72,20 @@ void measure_neck(const CurvedMesh& mesh, MotionMeasures& m) {
     }
 }
 
-// The quadratic in x is smallest at one of the principal curvatures or in between.
+// The smallest principal symbol at a node. The quadratic in x is smallest at one of the principal curvatures or in
+// between.
+double symbol_at(const MotionFields& fields, const Bending& bending, Eigen::Index i) {
+    const double H = fields.H[i], K = fields.K[i], half = std::sqrt(std::max(H * H / 4 - K, 0.0));
+    const CurvatureJet<double> f = density_at(bending, fields.H0_at(bending, i), H, K);
+    return least_principal_symbol(f, H / 2 - half, H / 2 + half);
+}
+
 void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
     m.symbol = std::numeric_limits<double>::infinity();
-    Eigen::VectorXd scale = Eigen::VectorXd::Constant(mesh.size(), HUGE_VAL);  // of waves that kg alone holds
-    for (int i = 0; i < mesh.size(); ++i) {
-        const double H = m.fields.H[i], K = m.fields.K[i], half = std::sqrt(std::max(H * H / 4 - K, 0.0));
-        const CurvatureJet<double> f = density_at(bending, m.fields.H0_at(bending, i), H, K);
-        const auto at = [&](double x) { return f.HH + 2 * f.HK * x + f.KK * x * x; };
-        double least = std::min(at(H / 2 - half), at(H / 2 + half));
-        if (f.KK > 0) least = std::min(least, at(std::clamp(-f.HK / f.KK, H / 2 - half, H / 2 + half)));
-        if (bending.kg > 0 && least < 0) scale[i] = std::sqrt(-2 * bending.kg / least);
-        if (bending.kg == 0 && !(least >= m.symbol)) m.symbol = least, m.least_symbol = mesh.nodes[i];
-    }
-    if (bending.kg > 0) m.coarse_wave = coarseness(mesh, scale);
+    m.coarse_wave = wave_coarseness(mesh, m.fields, bending);
+    for (int i = 0; i < mesh.size() && bending.kg == 0; ++i)
+        if (const double least = symbol_at(m.fields, bending, i); !(least >= m.symbol))
+            m.symbol = least, m.least_symbol = mesh.nodes[i];
 }
 
 void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
@@ -104,6 +105,15 @@ void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
 }
 
 }  // namespace
+
+Coarseness wave_coarseness(const CurvedMesh& mesh, const MotionFields& fields, const Bending& bending) {
+    if (bending.kg == 0) return {};
+    Eigen::VectorXd scale = Eigen::VectorXd::Constant(mesh.size(), HUGE_VAL);
+    for (int i = 0; i < mesh.size(); ++i)
+        if (const double symbol = symbol_at(fields, bending, i); symbol < 0)
+            scale[i] = std::sqrt(-2 * bending.kg / symbol);
+    return coarseness(mesh, scale);
+}
 
 Smoothness smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values) {
     if (mesh.order != 4) return {};

@@ -50,6 +50,9 @@ struct MotionMeasures {
 // began; without it the acceleration is 0.
 MotionMeasures measure(MovingSurface& surface, const MotionState& state, const MotionState* before = nullptr);
 
+// Where kg > 0 and the symbol is negative: the distance of nodes over sqrt(2 kg/|symbol|), theory.md (2.26).
+Coarseness wave_coarseness(const CurvedMesh& mesh, const MotionFields& fields, const Bending& bending);
+
 Smoothness smoothness_of(const CurvedMesh& mesh, const Eigen::VectorXd& values);
 
 // INT (H - tr B)^2/INT H^2 with the B of the averaged normal: how far two ways to find H differ on this mesh.

@@ -49,6 +49,7 @@ double order_in_space(const Problem& c, double smoothness) {
     return c.element_order < 4 ? rough_order : std::clamp(per_smoothness * smoothness, rough_order, smooth_order);
 }
 
+// Near walls and beads, or for waves that grow where kg > 0.
 bool too_coarse_at_places(const Problem& c, const CurvedMesh& mesh) {
     double coarse = wall_coarseness(mesh, c.energy.potentials).value;
     if (c.law.beads) {
@@ -56,7 +57,11 @@ bool too_coarse_at_places(const Problem& c, const CurvedMesh& mesh) {
         coarse = std::max(
             coarse, bead_coarseness(mesh, bead_numbers(SurfaceSpace(mesh), mesh, beads, 0), c.law.beads->width).value);
     }
-    return coarse > spare_at_places * coarsest_place;
+    if (coarse > spare_at_places * coarsest_place) return true;
+    if (c.energy.kg == 0) return false;
+    const SurfaceSpace space(mesh);
+    const MotionFields fields = motion_fields(space, mesh, Projection(space, mesh));
+    return wave_coarseness(mesh, fields, c.energy).value > spare_at_places;
 }
 
 // The number of triangles from which on the initial energy is as accurate as asked, by a coarser mesh and by a
