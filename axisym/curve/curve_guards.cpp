@@ -70,16 +70,17 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
             Stop::resolution_lost, time,
             fmt::format("an element near s = {:.4g} is {:.2g} times as long as the range of the wall there",
                         potential.s_coarse, potential.coarse),
-            "ask for more accuracy, or set discretisation.elements; a longer range needs fewer"};
+            "use a tighter accuracy.energy, or set discretisation.elements; a longer range needs fewer elements"};
     if (s.coarse_bead > coarsest)
         return StopReport{
             Stop::resolution_lost, time,
             fmt::format("an element near a bead is {:.2g} times as long as model.bead_width", s.coarse_bead),
-            "ask for more accuracy, or set discretisation.elements; wider beads need fewer"};
+            "use a tighter accuracy.energy, or set discretisation.elements; wider beads need fewer elements"};
     if (s.o.coarse > 1)
-        return StopReport{Stop::resolution_lost, time,
-                          unresolved_waves(fmt::format("an element near s = {:.4g} is", s.o.s_coarse), s.o.coarse),
-                          "ask for more accuracy, or set discretisation.elements; a larger energy.kg needs fewer"};
+        return StopReport{
+            Stop::resolution_lost, time,
+            unresolved_waves(fmt::format("an element near s = {:.4g} is", s.o.s_coarse), s.o.coarse),
+            "use a tighter accuracy.energy, or set discretisation.elements; a larger energy.kg needs fewer elements"};
     const std::vector<double>& breaks = space.splines().breaks();
     const int e = space.splines().element_at(s.o.s_curvature);
     const double turn = s.o.curvature * s.o.g_max * (breaks[e + 1] - breaks[e]);
@@ -87,7 +88,7 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
     return StopReport{
         Stop::resolution_lost, time,
         fmt::format("the tangent rotates across one element by {:.2g} radians near s = {:.4g}", turn, s.o.s_curvature),
-        "ask for more accuracy, or set discretisation.elements"};
+        "use a tighter accuracy.energy, or set discretisation.elements"};
 }
 
 }  // namespace tubule::axisym

@@ -23,8 +23,9 @@ namespace {
 constexpr double seam_size = 0.15, seam_per_accuracy = 5, least_seam = 3e-4;
 // In runs of more elements those at beads are shorter in proportion.
 constexpr double bead_elements = 8;
-constexpr double most_risen = 0.1;     // of E_ref: the energy of a first step that cannot be believed
-constexpr double newton_error = 2e-9;  // of the iteration, relative to the curve: area and volume are kept to that
+constexpr double most_risen = 0.1;         // of E_ref: the energy of a first step that cannot be believed
+constexpr double newton_error = 2e-9;      // of the iteration, relative to the curve: area and volume are kept to that
+constexpr double newton_rounding = 1e-13;  // and by rounding, about
 // 1 - (INT H)^2/(A INT H^2): below these, area and volume are (nearly) the same condition; see CurveLaw.
 constexpr double same_everywhere = 1e-12, nearly_same = 1e-3;
 
@@ -276,7 +277,8 @@ TimeControl CurveSetup::control(double first_step) const {
     control.max_order = c.time.max_order;
     control.first_step = first_step;
     control.growth = step_growth_of(settings);
-    control.newton = std::clamp(newton_error / settings.tolerance, 1e-5, 0.01);
+    control.newton =
+        std::clamp(newton_error / settings.tolerance, 1e-5, std::max(0.01, newton_rounding / settings.tolerance));
     control.two_iterations = true;
     control.second_may_grow = motion->law().open_rim;  // by the velocity, as the normal there turns
     return control;
@@ -339,9 +341,12 @@ InitialState initial_state(const CurveSetup& setup) {
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     if (setup.start.velocity) set_velocity(setup, y);
     // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
-    // rounding at the small elements of a seam does not prevent the next step (docs/decisions/curves.md).
+    // rounding, at the small elements of a seam or where much accuracy is asked for, does not prevent the next step
+    // (docs/decisions/curves.md).
     const double first_output = OutputTimes(setup.c.time).next();
-    double h = std::min(1e-8 * first_step_factor(setup.settings) * std::min(setup.c.time.end, 1.0), 0.1 * first_output);
+    const bool tight = setup.c.accuracy.energy < 1e-9 && setup.start.meridian.seams.empty();
+    double h = std::min((tight ? 1e-7 : 1e-8) * first_step_factor(setup.settings) * std::min(setup.c.time.end, 1.0),
+                        0.1 * first_output);
     const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
                         most_risen * setup.reference_energy;
     for (int tries = 0;; ++tries) try {

@@ -25,12 +25,12 @@ constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their st
 constexpr int few_steps = 8;
 const char* const too_far =
     "fixed area and volume allow only some distances of the beads: free one of them, end the extension earlier, or try "
-    "another accuracy";
+    "another accuracy.energy";
 const char* const too_far_for_area =
     "a fixed area allows only some distances of the bead from the ring: free the area, end the extension earlier, or "
-    "try "
-    "another accuracy";
-const char* const another_resolution = "try another accuracy, discretisation.elements or parametrisation";
+    "try another accuracy.energy";
+const char* const another_resolution =
+    "try another accuracy.energy, discretisation.elements or discretisation.parametrisation";
 constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
 constexpr double tiny_step = 1e-9;
 constexpr double hopeless_rise = 0.1;  // of E_ref: more is no error of a run that can be believed
@@ -108,9 +108,9 @@ void CurveSimulation::begin() {
         at = initial_state(setup_);
     } catch (const SolveError& error) {
         at = state_without_velocity(setup_);
-        initial_stop_ =
-            StopReport{Stop::solver_failed, 0, error.what(),
-                       "ask for more accuracy, set discretisation.elements, or choose a smoother initial shape"};
+        initial_stop_ = StopReport{
+            Stop::solver_failed, 0, error.what(),
+            "use a tighter accuracy.energy, set discretisation.elements, or choose a smoother initial shape"};
     }
     make_integrator(at.y, at.rate, at.time, at.step);
     const Snapshot s = setup_.with_exact_shape(measure(*setup_.motion, 0, at.shown.data(), at.rate.data()));
@@ -338,7 +338,7 @@ std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
             Stop::resolution_lost, past_.time,
             fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
                         rise / summary.reference_energy),
-            "ask for more accuracy; check that the energy resists bending where H = H0"};
+            "use a tighter accuracy.energy; check that the energy resists bending where H = H0"};
     }
     error = std::max(error, rise);
     past_.least = std::min(past_.least, bound);
@@ -365,8 +365,9 @@ std::optional<StopReport> CurveSimulation::find_guard(const Snapshot& s, double 
 
 Loop loop_of(CurveSimulation& run, const Problem& c, RunObserver& watch, const RunClock& clock) {
     Loop out(run, c, watch, clock, run.is_reported());
-    out.add(std::make_unique<Stall>(most_stalled, tiny_step * c.time.end, c.accuracy.energy,
-                                    "try another accuracy, discretisation.elements or parametrisation"));
+    out.add(std::make_unique<Stall>(
+        most_stalled, tiny_step * c.time.end, c.accuracy.energy,
+        "try another accuracy.energy, discretisation.elements or discretisation.parametrisation"));
     return out;
 }
 

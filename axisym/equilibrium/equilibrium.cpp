@@ -273,17 +273,18 @@ std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
 
 namespace {
 
-// Estimates the error on the last mesh but one from the energies on a sequence of meshes.
+// Estimates the error on the last mesh from the energies on a sequence of meshes.
 class MeshComparison {
 public:
-    // Infinite until there are two in a row. The error falls with this power of the number of elements.
+    // Infinite until there are two in a row. The error falls with this power of the number of elements, or less.
     double operator()(double energy, int elements, int power) {
         double error = std::numeric_limits<double>::infinity();
         if (elements_ > 0) {
-            const double change = std::abs(energy - energy_);
-            // Two energies may be close by accident. The previous change, reduced by the order of convergence, bounds
-            // the error, too.
-            error = std::max(change, change_ * std::pow(static_cast<double>(elements_) / elements, power));
+            const double change = std::abs(energy - energy_), expected = change_ * falls_;
+            falls_ = std::pow(static_cast<double>(elements_) / elements, power);
+            // Two energies may be close by accident: what is expected by the change before bounds the error, too.
+            const double slower = expected > 0 ? std::max(change / expected, 1.0) : unseen;
+            error = std::min(falls_ * slower, 1.0) * std::max(change, expected);
             change_ = change;
         }
         energy_ = energy, elements_ = elements;
@@ -292,7 +293,8 @@ public:
     void restart() { elements_ = 0, change_ = 0; }
 
 private:
-    double energy_ = 0, change_ = 0;
+    static constexpr double unseen = 2;  // two meshes do not show the order
+    double energy_ = 0, change_ = 0, falls_ = 1;  // the change to the last mesh, and by how much the next one is less
     int elements_ = 0;
 };
 
@@ -514,7 +516,7 @@ Equilibrium find_equilibrium(const StationaryProblem& problem, const Curve& star
                              const EquilibriumSettings& settings) {
     if (start.topology == Topology::tube)
         throw std::invalid_argument(
-            "equilibria of a periodic tube need a mirror-symmetric start, given as half a period");
+            "equilibria of a periodic tube need a mirror-symmetric initial shape, given as half a period");
     const int images = start.images(), elements = std::max(settings.elements, coarsest);
     const ArcLength arc(start);
     const auto space = std::make_shared<CurveSpace>(

@@ -155,7 +155,7 @@ Spectrum spectrum(const Bending& bending, const MotionLaw& law, Held held, const
         if (settings.first == 0 && (held != Held::nothing || law.inextensible) && !out.at_rest()) {
             if (!last) continue;  // perhaps a finer mesh shows it at rest
             throw std::invalid_argument(
-                "the shape is not at rest: a moving shape has a spectrum only in gradient flow with free area and "
+                "the shape is not stationary: a moving shape has a spectrum only in gradient flow with free area and "
                 "volume");
         }
         const ModeStability stability(problem, e);

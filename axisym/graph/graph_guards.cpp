@@ -39,7 +39,8 @@ std::span<const GraphGuard> graph_guards() {
              return StopReport{
                  Stop::resolution_lost, time,
                  unresolved_waves(fmt::format("an element near z = {:.6g} is", stage.place(o.z_coarse)), o.coarse),
-                 "ask for more accuracy, or set discretisation.elements; a larger energy.kg needs fewer"};
+                 "use a tighter accuracy.energy, or set discretisation.elements; a larger energy.kg needs fewer "
+                 "elements"};
          }},
         {[](const Observation& o, const GraphLimits&) { return o.domain.is_small() ? -1 : 1.0; },
          [](const Observation& o, const GraphMesh& stage, const double*, double time) {

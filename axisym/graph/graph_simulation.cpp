@@ -172,7 +172,7 @@ std::optional<StopReport> GraphSimulation::find_rise(const Observation& o) {
         Stop::resolution_lost, good_.time,
         fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
                     rise / summary.reference_energy),
-        "ask for more accuracy; check that the energy resists bending where H = H0"};
+        "use a tighter accuracy.energy; check that the energy resists bending where H = H0"};
 }
 
 std::optional<StopReport> GraphSimulation::check_error() {
@@ -183,7 +183,7 @@ std::optional<StopReport> GraphSimulation::check_error() {
         fmt::format("the error of the energy reached {:.2g} of E_ref{}", error_.now() / summary.reference_energy,
                     asked ? " with the given discretisation" : ""),
         asked ? "omit discretisation.elements and discretisation.time_tolerance, or refine them"
-              : "ask for more accuracy: errors grow during the run from this start"};
+              : "use a tighter accuracy.energy: errors grow during the run from this initial shape"};
 }
 
 std::optional<StopReport> GraphSimulation::find_event(bool) {
@@ -211,7 +211,7 @@ std::optional<StopReport> GraphSimulation::remesh() {
         return StopReport{Stop::resolution_lost, t,
                           fmt::format("the profile needs more than {} elements per cell near z = {:.6g}",
                                       most_graph_elements, mesh_->place(o.z_steep)),
-                          "ask for less accuracy"};
+                          "use a looser accuracy.energy"};
     }
     const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(integrator_->x(), mesh_->space.size());
     auto next = std::make_unique<GraphMesh>(mesh_->space.cell(), std::move(breaks), case_);
@@ -239,7 +239,7 @@ StopReport GraphSimulation::failure(const std::string& what) const {
     if (may_be_undefined(o.domain))
         return undefined_energy(o.domain, good_.time, fmt::format("z = {:.6g}", mesh_->place(o.domain.place)));
     return {Stop::solver_failed, good_.time, fmt::format("{} ({})", what, suspects()),
-            "ask for more accuracy, or lower time.max_order"};
+            "use a tighter accuracy.energy, or lower time.max_order"};
 }
 
 std::optional<StopReport> GraphSimulation::recover() {

@@ -342,8 +342,9 @@ void check_neck(Keys& k, const Case& c) {
                 k.check("accuracy.r_min", [&]() -> std::string {
                     const Neck neck = narrowest(shape);
                     if (c.accuracy.r_min < neck.radius) return {};
-                    return fmt::format("must be below the smallest radius of the start ({:.6g} at z = {:.6g}), not {}",
-                                       neck.radius, neck.z, c.accuracy.r_min);
+                    return fmt::format(
+                        "must be below the smallest radius of the initial shape ({:.6g} at z = {:.6g}), not {}",
+                        neck.radius, neck.z, c.accuracy.r_min);
                 });
         },
         c.shape);

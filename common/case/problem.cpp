@@ -20,6 +20,12 @@ Scheme scheme_of(const Case& c, bool inertia) {
     return default_scheme(inertia);
 }
 
+// Of curved triangles. Those of a file are measured by fits through its points, which order 4 makes no better.
+int default_order(const Case& c) {
+    const bool measured = !c.moves() && !c.equilibrium;
+    return measured && std::holds_alternative<MeshFile>(c.shape) ? 3 : 4;
+}
+
 }  // namespace
 
 Problem::Problem(Case c)
@@ -28,7 +34,7 @@ Problem::Problem(Case c)
       law(motion_law(model)),
       held((equilibrium ? equilibrium->held : std::nullopt).value_or(default_held(model))),
       scheme(scheme_of(*this, law.inertia != 0)),
-      element_order(surface.order.value_or(moves() || equilibrium ? 4 : 3)),
+      element_order(surface.order.value_or(default_order(*this))),
       begin_time(handover ? handover->time : 0) {}
 
 Problem Problem::of_profile(double end, std::vector<double> output) const {

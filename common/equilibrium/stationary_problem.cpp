@@ -155,8 +155,8 @@ std::string missed_constraint(const Constraints& goal, double first_area, double
         const double scale = std::max(std::abs(*wanted), std::abs(from));
         if (!(std::abs(to - *wanted) < 0.01 * scale) && missed.empty())
             missed = fmt::format(
-                "no shape with {} {:.6g} was found: the start has {:.6g}, and the descent from there "
-                "came to {:.6g}",
+                "no shape with {} {:.6g} was found: the initial shape has {:.6g}, and the descent from there ended at "
+                "{:.6g}",
                 what, *wanted, from, to);
     };
     compare("area", goal.area, first_area, area);

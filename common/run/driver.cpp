@@ -17,7 +17,7 @@ void judge(RunSummary& s, const Problem& c, const std::string& fixed_by) {
                                                  : "the error of the energy is unknown",
                       missed = fmt::format("{}, but {:.2g} was asked for", error, c.accuracy.energy);
     if (fixed_by.empty() && s.stop.reason == Stop::finished)
-        s.stop = {Stop::resolution_lost, s.stop.time, missed, "ask for less accuracy"};
+        s.stop = {Stop::resolution_lost, s.stop.time, missed, "use a looser accuracy.energy"};
     else
         s.warnings.push_back(fixed_by.empty() ? missed : fmt::format("{}: {}", missed, fixed_by));
 }

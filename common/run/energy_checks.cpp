@@ -34,7 +34,7 @@ std::string key_of_formula(const Bending& energy) {
 
 CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where) {
     return complaint(c, key_of_formula(c.energy),
-                     fmt::format("must be defined on the start, but at {} {}", where, words(margin)));
+                     fmt::format("must be defined on the initial shape, but at {} {}", where, words(margin)));
 }
 
 void require_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where) {
@@ -125,13 +125,14 @@ constexpr double least_scale = 1e-6;  // of the magnitude: an energy below it ha
 double reference_energy(const Problem& c, double energy, double by_magnitude) {
     const std::string formula = key_of_formula(c.energy);
     if (formula != "energy" && !(std::isfinite(energy) && std::isfinite(by_magnitude)))
-        throw complaint(c, formula, "must be finite on the start, but it overflows there");
+        throw complaint(c, formula, "must be finite on the initial shape, but it overflows there");
     if (!c.accuracy.relative_to_energy) return by_magnitude;
     if (std::abs(energy) < least_scale * by_magnitude)
-        throw complaint(c, "accuracy.relative_to",
-                        fmt::format("must not be \"energy\": the energy of the start is {:.2g}, of terms as large as "
-                                    "{:.4g}",
-                                    energy, by_magnitude));
+        throw complaint(
+            c, "accuracy.relative_to",
+            fmt::format(
+                "must not be \"energy\": the energy of the initial shape is {:.2g}, of terms as large as {:.4g}",
+                energy, by_magnitude));
     return std::abs(energy);
 }
 
@@ -139,11 +140,11 @@ std::string doubt_before(const Problem& c, double energy, double E_ref) {
     const double allowed = c.accuracy.energy * E_ref;
     if (!(allowed > std::abs(energy)) || !std::isfinite(allowed)) return "";
     const std::string doubt = fmt::format(
-        "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy of the start is "
-        "{:.3g}",
+        "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy of the initial "
+        "shape is {:.3g}",
         c.accuracy.energy, allowed, E_ref, energy);
     if (energy == 0) return doubt;
-    return fmt::format("{}: ask for less than {:.1g}", doubt, std::abs(energy) / E_ref);
+    return fmt::format("{}; set accuracy.energy below {:.1g}", doubt, std::abs(energy) / E_ref);
 }
 
 std::string doubt_after(const Problem& c, Stop stop, double start, double end, double E_ref) {
@@ -151,7 +152,7 @@ std::string doubt_after(const Problem& c, Stop stop, double start, double end, d
     if (kind_of(stop).exit_code != 0 || !(allowed > change) || change <= no_change * E_ref) return "";
     return fmt::format(
         "accuracy.energy = {:.2g} allows for an error of {:.3g}, as E_ref = {:.4g}, but the energy changed by only "
-        "{:.3g}: ask for less than {:.1g}",
+        "{:.3g}; set accuracy.energy below {:.1g}",
         c.accuracy.energy, allowed, E_ref, change, change / E_ref);
 }
 

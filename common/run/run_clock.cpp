@@ -15,9 +15,9 @@ RunSummary paused_at_start(const Paused& pause) {
     RunSummary out;
     out.stop = pause_report(pause, 0);
     out.stop.message += " before the first state was computed";
-    out.stop.advice = pause.reason == Stop::time_limit
-                          ? "raise time.limit, or make the start easier: fewer elements, less accuracy"
-                          : "run the case again";
+    out.stop.advice = pause.reason == Stop::time_limit ? "raise time.limit, or make the initial state cheaper to "
+                                                         "compute: use fewer elements or a looser accuracy.energy"
+                                                       : "run the case again";
     out.estimated_error = 1;  // nothing is known
     out.as_accurate_as_asked = false;
     out.effort = "no state";

@@ -12,6 +12,7 @@
 #include "common/series/table.hpp"
 #include "surface3d/equilibrium/surface_branch.hpp"
 #include "surface3d/fem/mesh_quality.hpp"
+#include "surface3d/fem/projection.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/mesh_record.hpp"
 
@@ -68,15 +69,21 @@ struct ShapeRow {
     double height, r_max, wall_seconds;
 };
 
+// Of the area.
+Eigen::Vector3d centre_of(const CurvedMesh& mesh) {
+    const SurfaceSpace space(mesh);
+    const auto moments = load<4>(space, mesh, [&](int, const CellColumns<3>& X, int q, CellColumns<4>& out) {
+        const SurfacePoint<double> p = tangent_point(X, space.tabulation(), q);
+        out.col(0) += space.tabulation().weight[q] * p.area * p.x.homogeneous();
+    });
+    return moments.rowwise().sum().eval().hnormalized();
+}
+
 // Along z, and from the axis in this direction through the centre.
 std::array<double, 2> height_and_radius(const CurvedMesh& mesh) {
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    const Eigen::Vector3d centre = mesh.period > 0 ? Eigen::Vector3d::Zero().eval() : centre_of(mesh);
     double low = HUGE_VAL, high = -HUGE_VAL, r = 0;
-    for (const Eigen::Vector3d& x : mesh.nodes) {
-        centre += x / static_cast<double>(mesh.size());
-        low = std::min(low, x.z()), high = std::max(high, x.z());
-    }
-    if (mesh.period > 0) centre.setZero();
+    for (const Eigen::Vector3d& x : mesh.nodes) low = std::min(low, x.z()), high = std::max(high, x.z());
     for (const Eigen::Vector3d& x : mesh.nodes) r = std::max(r, (x - centre).head<2>().norm());
     return {mesh.period > 0 ? mesh.period : high - low, r};
 }

@@ -62,7 +62,7 @@ double MotionError::begin(int triangles, const MotionMeasures& start) {
     of_run_.growth = growth_of_coarser(case_, start.smoothness);
     of_run_.spare = spare_for_waves(case_, start.smoothness);
     attempt([&] { begin(triangles); }, case_.begin_time);
-    return error_of_start(case_, start_, of_.elements, start.free_energy);
+    return error_of_start(case_, start_, of_.elements, start.free_energy, is_rough(start.smoothness));
 }
 
 void MotionError::begin(int triangles) {

@@ -29,9 +29,10 @@ constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of 
 constexpr double stable_growth = 2.4, any_growth = 1e9;   // of steps; beyond the first bdf2 is unstable
 constexpr double spare_in_time = 1.25;                    // at most 1.1 of the error was seen to be missing
 constexpr double unresolved_waves = 1.6;                  // of rough fluids: at most 1.37 was seen to be missing
-constexpr double sped_up = 2;             // times the least dissipation: the motion has left what it rested at
-constexpr double least_more_steps = 1.5;  // of the run, than of the coarser one: fewer would tell nothing
-constexpr double surest_growth = 4.5;     // of errors: they have maxima between the steps that are compared
+constexpr double between_compared = 1.25;  // of other fluids, whose errors have maxima between the steps compared
+constexpr double sped_up = 2;              // times the least dissipation: the motion has left what it rested at
+constexpr double least_more_steps = 1.5;   // of the run, than of the coarser one: fewer would tell nothing
+constexpr double surest_growth = 4.5;      // of errors: they have maxima between the steps that are compared
 
 double tolerance_for(const Problem& c) {
     const double accuracy = c.accuracy.energy;
@@ -64,10 +65,17 @@ bool too_coarse_at_places(const Problem& c, const CurvedMesh& mesh) {
     return wave_coarseness(mesh, fields, c.energy).value > spare_at_places;
 }
 
+bool is_rough_at_first(const Start& start, int order) {
+    const CurvedMesh mesh = start.mesh(first_triangles, order).mesh;
+    const SurfaceSpace space(mesh);
+    return is_rough(smoothness_of(mesh, motion_fields(space, mesh, Projection(space, mesh)).H));
+}
+
 // The number of triangles from which on the initial energy is as accurate as asked, by a coarser mesh and by a
 // finer one: two of them may agree by chance.
 int triangles_for_start(const Problem& c, const Start& start) {
     const int order = c.element_order;
+    const bool rough = is_rough_at_first(start, order);
     MotionSettings other{.role = Role::fewer_triangles};
     for (int n = first_triangles;; n = static_cast<int>(growth_of_start * n)) {
         const StartMesh mesh = start.mesh(n, order), coarse = start.mesh(fewer_triangles(n), order);
@@ -79,7 +87,7 @@ int triangles_for_start(const Problem& c, const Start& start) {
         const double error = later * std::abs(energy - before) / (growth_in_space(other, smooth_order) - 1);
         const double asked = c.accuracy.energy * reference_energy(c, o, length);
         const bool at_places = too_coarse_at_places(c, mesh.mesh) && growth_of_start * n < most_triangles;
-        const bool more = (error > asked || error_of_start(c, start, n, energy) > asked) &&
+        const bool more = (error > asked || error_of_start(c, start, n, energy, rough) > asked) &&
                           growth_of_start * n < most_first_triangles;
         if (!more && !at_places) return n;
     }
@@ -120,8 +128,8 @@ double growth_of_coarser(const Problem& c, const Smoothness& start) {
 }
 
 double spare_for_waves(const Problem& c, const Smoothness& start) {
-    const bool waves = c.law.inertia != 0 && c.element_order == 4 && is_rough(start);
-    return waves ? unresolved_waves : 1;
+    if (c.law.inertia == 0) return 1;
+    return c.element_order == 4 && is_rough(start) ? unresolved_waves : between_compared;
 }
 
 double error_by_difference(const Problem& c, const MotionSettings& coarser, double smoothness) {

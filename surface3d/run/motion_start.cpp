@@ -14,7 +14,7 @@ namespace {
 
 // Measured choices: docs/decisions/surface_motion.md, "Surfaces in motion".
 constexpr double relaxes_in = 0.2;   // of the time that the shape needs to change
-constexpr double much_finer = 2.25;  // times more triangles: errors of the initial shape fall at least by this
+constexpr double much_finer = 2.25;  // times more triangles: by this, errors of the initial energy fall at least
 // H counts as constant if it varies by less than this, or by `times_noise` times the difference of two recoveries.
 constexpr double same_everywhere = 1e-9, times_noise = 4;
 
@@ -56,12 +56,13 @@ double free_energy(const Problem& c, const Observables& o, double length) {
     return o.energy + SurfaceLaw(c.law).potential(c.begin_time, {o.area, o.volume, length});
 }
 
-double error_of_start(const Problem& c, const Start& start, int elements, double energy) {
+double error_of_start(const Problem& c, const Start& start, int elements, double energy, bool rough) {
     if (!start.resizable()) return 0;
     try {
         const StartMesh finer = start.mesh(static_cast<int>(much_finer * elements), c.element_order);
         const double change = free_energy(c, observe_start(c, finer), start_length(c, finer.mesh)) - energy;
-        return std::abs(change) * much_finer / (much_finer - 1);
+        const double falls = rough ? std::sqrt(much_finer) : much_finer;
+        return std::abs(change) * falls / (falls - 1);
     } catch (const SolveError&) {
         return 0;
     }
@@ -79,8 +80,9 @@ Eigen::VectorXd start_H0(const Problem& c, const StartMesh& start) {
     const auto at = [&](const Eigen::Vector3d& x) {
         const double value = evaluate(*c.energy.H0_formula, x.data());
         if (!std::isfinite(value))
-            throw complaint(c, "energy.H0",
-                            fmt::format("is no number at ({:.4g}, {:.4g}, {:.4g}) of the start", x[0], x[1], x[2]));
+            throw complaint(
+                c, "energy.H0",
+                fmt::format("is no number at ({:.4g}, {:.4g}, {:.4g}) of the initial shape", x[0], x[1], x[2]));
         return value;
     };
     Eigen::VectorXd out(mesh.size());

@@ -17,8 +17,9 @@ Observables observe_start(const Problem& c, const StartMesh& start);
 double start_length(const Problem& c, const CurvedMesh& mesh);
 double free_energy(const Problem& c, const Observables& start, double length);
 // Absolute error of this initial energy on a mesh of this number of elements, by a finer mesh, since where the shape is
-// not smooth a coarser one may be off by the same. 0 where there is none.
-double error_of_start(const Problem& c, const Start& start, int elements, double energy);
+// not smooth a coarser one may be off by the same; there it falls with the width of the triangles. 0 where there is
+// none.
+double error_of_start(const Problem& c, const Start& start, int elements, double energy, bool rough);
 double reference_energy(const Problem& c, const Observables& start, double length);
 
 // The spontaneous curvature at the nodes, where it varies; else nothing. Throws CaseError where a formula is no number,

@@ -21,14 +21,17 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr int fewest_triangles = 80, most_refined_triangles = 100000;
-// The estimate assumes that halving the width reduces errors by a factor between these.
-constexpr double slowest_fall = 1.0 / 2, second_order_fall = 1.0 / 4, fastest_fall = 1.0 / 8;
+// The estimate assumes that halving the width reduces errors by a factor between this and fall_of().
+constexpr double slowest_fall = 1.0 / 2;
 
+// Less than by the orders of energies, which are 4, and 6 with elements of order 4, by curvatures recovered from nodes.
 // Second derivatives of the elements are of order 2, however fast the first meshes seem to get better.
-double fall_of(Recovery recovery) {
+double fall_of(const Problem& c) {
+    const Recovery recovery = c.surface.recovery;
     const bool from_nodes =
         recovery == Recovery::patch || recovery == Recovery::patch_nodal || recovery == Recovery::exact;
-    return from_nodes ? fastest_fall : second_order_fall;
+    if (!from_nodes) return 1.0 / 4;
+    return c.element_order == 4 ? 1.0 / 32 : 1.0 / 8;
 }
 
 // A surface fitted to 720 points of an ellipsoid was 1.2 times further off than its two orders were apart.
@@ -179,7 +182,7 @@ public:
 private:
     double measure_next() override {
         energies_.push_back(measure_on(elements_ / part_));
-        return estimated_error(energies_, second_order_fall);
+        return estimated_error(energies_, std::min(2 * fall_of(case_), 1.0 / 4));
     }
 
     int elements_, part_ = 16;
@@ -202,7 +205,7 @@ private:
     double measure_next() override {
         std::vector<double>& same = energies_[meshes_ % 2];
         same.push_back(measure_on(triangles_));
-        const double fall = fall_of(case_.surface.recovery);
+        const double fall = fall_of(case_);
         const double before = std::exchange(before_, estimated_error(same, fall));
         return std::max(before_, std::sqrt(fall) * before);
     }

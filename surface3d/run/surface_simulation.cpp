@@ -84,20 +84,29 @@ void SurfaceSimulation::begin(const Start& from) {
     if ((initial_stop_ = find_fold(mesh_quality(start.mesh)))) return;
     remember_start(case_, start, space, memory_);
     summary.reference_energy = memory_.scale.reference_energy;
-    memory_.next_step =
-        case_.surface.step.value_or(std::min(first_step * memory_.scale.relaxation, case_.time.end - begin_time()));
+    memory_.next_step = first_step_from(std::min(first_step * memory_.scale.relaxation, case_.time.end - begin_time()));
     use_mesh(start.mesh);
     const SurfaceLaw& law = surface().law();
     if (law.keeps_volume && surface().area_is_volume(start.mesh, surface().fields(start.mesh))) refuse_to_deform(case_);
     const VectorField u = start_velocity(case_, start);
     state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped(), {}, begin_time())
                           : surface().start(start.mesh, begin_time());
-    if (surface().law().inertia == 0 && traits().controls_steps) set_moving();
+    const bool moves = surface().law().inertia == 0 && traits().controls_steps;
+    if (moves) set_moving();
     measure_state();
+    if (moves && is_reported()) now_.dissipation = initial_dissipation();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_));
     update_error();  // the begin time is compared, too
     error_now_ = std::max(error_now_, memory_.error);
+}
+
+// The first step of a scheme that remembers earlier ones: `by_error`, unless the case gives its steps. Then a scheme of
+// high order, whose first steps are of low order, begins with steps so short that they leave no error of low order.
+double SurfaceSimulation::first_step_from(double by_error) const {
+    if (!case_.surface.step) return by_error;
+    const double step = *case_.surface.step, share = std::min(step / (case_.time.end - begin_time()), 1.0);
+    return is_of_high_order(case_) ? step * std::pow(share, 1.5) : step;
 }
 
 // Without inertia the surface moves from t = 0 on: takes the velocity of a very short step, against which the error of
@@ -111,6 +120,33 @@ void SurfaceSimulation::set_moving() {
         state_.stretch = soon.stretch;
     } catch (const SolveError&) {
     }
+}
+
+// The force has noise of short wavelength on coarse meshes, which rules the dissipation of the velocity that it drives.
+// The velocity of an implicit step has the less of it the longer the step: twice the dissipation of a step less that of
+// one twice as long, for the steps where that changes least, or hardly.
+double SurfaceSimulation::initial_dissipation() const {
+    constexpr double hardly = 0.01;
+    constexpr int most_trials = 6;
+    const auto after = [&](double tau) {
+        const MotionState soon = scheme_->step(state_, tau).state;
+        MotionState now = state_;
+        now.u = soon.u, now.w = soon.w, now.p = soon.p, now.lambda = soon.lambda, now.tension = soon.tension;
+        return measure(surface(), now).dissipation;
+    };
+    double best = now_.dissipation, extrapolated = best, least_change = HUGE_VAL;
+    try {
+        double tau = memory_.next_step / 4, of_step = after(tau);
+        for (int i = 0; i < most_trials; ++i) {
+            const double of_longer = after(tau *= 2), next = 2 * of_step - of_longer;
+            const double change = i > 0 ? std::abs(next - extrapolated) : HUGE_VAL;
+            extrapolated = next, of_step = of_longer;
+            if (change < least_change) best = next, least_change = change;
+            if (change <= hardly * next) break;
+        }
+    } catch (const SolveError&) {  // the first step says why
+    }
+    return best;
 }
 
 void SurfaceSimulation::resume(const Restart& restart, const Start& start) {
@@ -190,7 +226,7 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::try_step(double tau
         if (!case_.surface.step && error > 2)
             return Refusal{std::clamp(safety / std::cbrt(error), 0.2, 0.7),
                            {Stop::solver_failed, t, fmt::format("steps of {:.3g} are still too inaccurate", tau),
-                            "ask for less accuracy, or use more elements"}};
+                            "use a looser accuracy.energy, or more elements"}};
         const CurvedMesh mesh = surface().mesh(next.state);
         if (auto fold = find_fold(mesh_quality(mesh))) {
             fold->time = t;
@@ -251,7 +287,10 @@ void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
 
 // A step that was cut short by an output says little about how long the next one may be.
 void SurfaceSimulation::choose_next_step(double tau, double asked, double error, int order) {
-    if (case_.surface.step) return;
+    if (case_.surface.step) {
+        memory_.next_step = std::min(*case_.surface.step, growth * tau);
+        return;
+    }
     const double factor = error > 0 ? std::clamp(safety / std::pow(error, 1.0 / (order + 1)), 0.4, growth) : growth;
     memory_.next_step = std::max(tau * factor, tau < asked ? std::min(asked, growth * tau) : 0.0);
 }
@@ -278,7 +317,7 @@ void SurfaceSimulation::make_new_mesh() {
     if (!better || (better->quality.worst < now_.quality.worst && !is_coarse())) return;
     if (!change_mesh(better->mesh, better->fields, HUGE_VAL)) return;
     memory_.grid = 0;
-    if (!case_.surface.step) memory_.next_step = std::min(memory_.next_step, first_step * memory_.scale.relaxation);
+    memory_.next_step = first_step_from(std::min(memory_.next_step, first_step * memory_.scale.relaxation));
 }
 
 // Where the coarser run can follow, which is where it has got to the same time.
@@ -308,7 +347,7 @@ bool SurfaceSimulation::thin_to(int triangles, double most_jump) {
     memory_.grid = triangles;
     memory_.count.mesh_since = memory_.count.steps;
     ++memory_.count.thinned;
-    if (!case_.surface.step) memory_.next_step = shorter_first_step * memory_.next_step;
+    memory_.next_step = first_step_from(shorter_first_step * memory_.next_step);
     return true;
 }
 
@@ -461,8 +500,9 @@ std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
     return crossing;
 }
 
-// The error stated in a row is at least the rise of its energy, and the defect of its balance: both runs of the pair
-// may have these errors in common.
+// The error stated in a row is the largest one until then, since at one instant the energies of a pair may agree by
+// chance. It is at least the rise of the energy, and the defect of its balance: both runs of the pair may have these
+// errors in common.
 std::optional<StopReport> SurfaceSimulation::update_error() {
     if (!is_reported()) return std::nullopt;
     std::optional<double> error;
@@ -470,8 +510,8 @@ std::optional<StopReport> SurfaceSimulation::update_error() {
         error = error_->follow_to(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
     const double rise = total() - memory_.balance.lowest_total, spare = error_ ? error_->spare() : 1,
                  defect = spare * std::abs(memory_.balance.defect_at(total()));
-    error_now_ = std::max({error.value_or(memory_.scale.reference_energy), rise, defect});
     if (error) memory_.error = std::max({memory_.error, *error, rise});
+    error_now_ = std::max(error ? memory_.error : memory_.scale.reference_energy, defect);
     return std::nullopt;
 }
 
@@ -546,7 +586,7 @@ Loop loop_of(SurfaceSimulation& run, const Problem& c, RunObserver& watch, const
     Loop out(run, c, watch, clock, run.is_reported());
     if (run.has_state())
         out.add(std::make_unique<Stall>(most_stalled, run.shortest_usual_step(), c.accuracy.energy,
-                                        "ask for less accuracy, or use more elements"));
+                                        "use a looser accuracy.energy, or more elements"));
     return out;
 }
 

@@ -75,6 +75,8 @@ private:
     // The initial shape.
     void use_mesh(const CurvedMesh& mesh);
     void set_moving();
+    double first_step_from(double by_error) const;
+    double initial_dissipation() const;
     void measure_state();
 
     // A step.

@@ -22,7 +22,7 @@ class Advice(ProgramTest):
 
     def test_an_axisymmetric_start_does_not_need_three_dimensions(self):
         told = self.advice("case.toml", "tier=surface3d", "accuracy.energy=1e-2", "discretisation.order=2")
-        self.assertRegex(told, r"^tier axisym, model gradient-flow, accuracy 0.01: some 0\.\d+ s; start and model are axisymmetric")
+        self.assertRegex(told, r"^tier axisym, model gradient-flow, accuracy 0.01: some 0\.\d+ s; the initial shape and the model are axisymmetric")
 
     def test_a_start_without_symmetry_does(self):
         self.write("case.toml", QUICK.replace('"axisym"', '"surface3d"').replace("1e-6", "1e-2").replace("n = 1\n", "n = 1\nm = 1\n"))

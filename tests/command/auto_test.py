@@ -48,7 +48,7 @@ class Buckling(ProgramTest):
         self.assertAlmostEqual(end["switch_time"], SWITCH, delta=1e-4 * SWITCH)
         self.assertAlmostEqual(end["switch_amplitude"], 1e-2, delta=1e-6)
         for words in self.printed:
-            self.assertIn("a wave with m = 1 grows from 0.0001 to 0.01 of the radius at t = 7.521", words)
+            self.assertIn("the non-axisymmetric mode m = 1 grows from 0.0001 to 0.01 of the radius at t = 7.521", words)
 
     def test_rows_of_both_parts_join(self):
         rows = series(self.result)
@@ -156,7 +156,7 @@ end = 0.01
     def test_a_smooth_start_has_80(self):
         end = self.run_case('kind = "ellipsoid"\na = 1.0\nb = 0.9\nc = 0.8')
         self.assertEqual((end["choice"], end["elements"]), ("surface3d", 80))
-        self.assertEqual(end["triangles"], "80, since the start is smooth")
+        self.assertEqual(end["triangles"], "80, since the initial shape is smooth")
         self.assertLess(end["estimated_error"], 1e-2)
 
     def test_a_wavy_start_has_more(self):

@@ -150,7 +150,7 @@ class EnergiesTest(ProgramTest):
     def test_formula_that_is_not_defined(self):
         tube = SHAPE + REST
         err = self.refused("run", self.write("case.toml", case(term(1.0, formula="log(-1 - H)"), more=tube.replace("0.8", "1.2"))))
-        self.assertRegex(err, r"case\.toml:7:11: energy\.term\.0\.formula must be defined on the start, but at r = 1\.2, z = .*")
+        self.assertRegex(err, r"case\.toml:7:11: energy\.term\.0\.formula must be defined on the initial shape, but at r = 1\.2, z = .*")
         self.assertIn("the argument of log at character 1 of the formula is -0.1667", err)
         # The tube widens, H rises to -1, where the logarithm ends: with little weight it does not keep it from that.
         wide = tube.replace("0.8", "0.95").replace("1e-3", "100.0")
@@ -163,7 +163,7 @@ class EnergiesTest(ProgramTest):
     def test_formulas_that_have_no_value_are_named(self):
         # K = 0 on the straight tube, and both signs on the wavy one; H = -3 at the poles of the ellipsoid: 2 a/c^2 there.
         ellipsoid = "[shape]\nkind = 'ellipsoid'\na = 1.0\nb = 1.0\nc = 1.5\n" + REST
-        overflow = "must be finite on the start, but at r = .*, where H = .* and K = .*, it or a derivative of it overflows"
+        overflow = "must be finite on the initial shape, but at r = .*, where H = .* and K = .*, it or a derivative of it overflows"
         for formula, shape, words in (
             ("K/K", SHAPE + REST, "must be defined .* the divisor at character 2 of the formula is .* it vanishes"),
             ("1/K", SHAPE + MODE + REST, "the divisor at character 2 .*, and has the other sign elsewhere: it vanishes in between"),
@@ -187,7 +187,7 @@ class EnergiesTest(ProgramTest):
         # f_HH = 2 k20 + 6 k30 (H - H0) vanishes at H - H0 = -k20/(3 k30): H = -1/R.
         at_once = case(term(0.5, 3, 0), more=SHAPE.replace("0.8", "1.0") + REST)  # .4 + 3 (-.5) < 0
         said = self.refused("run", self.write("case.toml", at_once), "-o", self.result)
-        self.assertIn("energy.term.0.modulus makes the start ill-posed, and nothing is run: ", said)
+        self.assertIn("energy.term.0.modulus makes the problem ill-posed at the initial shape, and nothing is run: ", said)
         self.assertFalse(self.result.exists())
         # A case that expects it has it recorded.
         self.run_case(at_once + '[expect]\nstop = "ill-posed"\n', status=3)
@@ -214,7 +214,7 @@ class EnergiesTest(ProgramTest):
         ):
             path = self.write("case.toml", text)
             for words in (self.refused("check", path), self.refused("check", "--quick", path), self.refused("run", path)):
-                self.assertIn(f"case.toml:{blamed} makes the start ill-posed, and nothing is run: ", words)
+                self.assertIn(f"case.toml:{blamed} makes the problem ill-posed at the initial shape, and nothing is run: ", words)
         found = json.loads(self.tubule("check", "--json", path, status=2)[0])["cases"][0]
         self.assertFalse(found["valid"])
         self.assertIn("ill-posed", found["errors"][0]["message"])
@@ -232,7 +232,7 @@ class EnergiesTest(ProgramTest):
         varies = case(tier="surface3d", listed=listed, more=sphere + few + moves, spontaneous='"0*x"')
         for text in (case(tier="surface3d", listed=listed, more=frame + moves), varies):
             path = self.write("case.toml", text)
-            self.assertIn("makes the start ill-posed, and a run ends at once: ", self.tubule("check", path)[1])
+            self.assertIn("makes the problem ill-posed at the initial shape, and a run ends at once: ", self.tubule("check", path)[1])
             self.tubule("run", path, "-o", self.result, "--overwrite", status=3)
             self.assertEqual(about(self.result)["stop"], "ill-posed")
             self.result.unlink()

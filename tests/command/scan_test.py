@@ -272,7 +272,7 @@ class Refusals(ScanTest):
              "--boundary", "outcome", "--refine", "3"),
             ("--jobs must be 1 or more", "case.toml", *over, "--jobs", "0"),
             ("points are too many", "case.toml", "--over", f"{K42}=0:1:100000", "--over", f"{AMPLITUDE}=0:0.1:1000"),
-            ("below the smallest radius of the start", "case.toml", "--over", f"{AMPLITUDE}=0.1,0.99"),
+            ("below the smallest radius of the initial shape", "case.toml", "--over", f"{AMPLITUDE}=0.1,0.99"),
             ("points.csv: cannot be opened", "case.toml", "--points", "points.csv"),
         ):
             with self.subTest(words):

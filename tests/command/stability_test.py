@@ -240,7 +240,7 @@ class Stability(ProgramTest):
     def test_spectra(self):
         case = self.write("cell.toml", CAPSULE)
         out, _ = self.tubule("stability", case)
-        self.assertIn("at rest", out)
+        self.assertIn("stationary", out)
         # As in `tubule equilibrium`.
         self.tubule("equilibrium", "--quiet", case, "--set", "equilibrium.modes=2")
         known = series(self.folder / "cell.hdf")
@@ -251,12 +251,12 @@ class Stability(ProgramTest):
         # A shape without a size of its own, with the reduced volume held.
         held = CAPSULE.replace("[equilibrium]", "[equilibrium]\nheld = 'reduced-volume'").replace("k42 = 0.12", "")
         vesicle = self.write("vesicle.toml", held.replace("H0 = -2.0", ""))
-        self.assertIn("at rest", self.tubule("stability", vesicle)[0])
+        self.assertIn("stationary", self.tubule("stability", vesicle)[0])
         # The tube as it is: the closed form, for a wave of 1e-4.
         numerical = [row for row in self.table(self.tube, "--numerical") if row["m"] == "0"]
         self.assertAlmostEqual(float(numerical[0]["rate"]), rate_at_rest(2 * math.pi / 7), delta=1e-5)
         wavy = ("--set", "shape.mode.0.amplitude=0.2", "--numerical")
-        self.refuses("not at rest", self.tube, *wavy, "--model", "overdamped")
+        self.refuses("not stationary", self.tube, *wavy, "--model", "overdamped")
         self.tubule("stability", self.tube, *wavy)
         self.refuses("inertia", self.write("fluid.toml", FLUID), "--numerical")
 

@@ -167,7 +167,7 @@ class Surface(unittest.TestCase):
         self.assertEqual(done.returncode, 4, done.stderr)
         with h5py.File(self.directory / "folded.hdf") as f:
             self.assertEqual(f["about"].attrs["stop"], "mesh-lost")
-            self.assertEqual(f["frames/000000/Points"].shape, (362, 3))
+            self.assertEqual(f["frames/000000/Points"].shape, (642, 3))
 
 
 if __name__ == "__main__":

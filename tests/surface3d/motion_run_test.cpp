@@ -124,7 +124,7 @@ TEST(MotionSettings, RoughFluidsStateMore) {
                                smoothness_of_start(shape, 180));
     };
     EXPECT_GT(spare("fluid", capsule), 1.37);
-    EXPECT_EQ(spare("fluid", ellipsoid), 1);
+    EXPECT_EQ(spare("fluid", ellipsoid), 1.25);  // errors of fluids have maxima between the steps that are compared
     EXPECT_EQ(spare("stokes", capsule), 1);
 }
 
@@ -205,6 +205,39 @@ end = 0.0226
     EXPECT_GT(error, 5e-4);
     EXPECT_LT(error, o.summary.estimated_error);
     EXPECT_GT(error, o.summary.estimated_error / 5);
+}
+
+TEST(MotionRun, InitialDissipationIsNotThatOfTheNoiseOfTheMesh) {
+    // Expected: INT b^2 dS, b = -(2 Lap H + H^3 - 4 H K), by quadrature of the closed form. The force of the mesh alone
+    // gives 6839 and 397.
+    const std::string spheroid =
+        "energy.k20 = 1.0\nmodel.kind = \"gradient-flow\"\naccuracy.estimate = false\n"
+        "shape = {kind = \"ellipsoid\", a = 1.0, b = 1.0, c = 1.5}\n[time]\nend = 1e-5\n";
+    for (const auto& [triangles, off] : {std::pair{80, 0.05}, {320, 1e-3}}) {
+        const Outcome o = run_case(spheroid, {fmt::format("discretisation.elements={}", triangles)});
+        EXPECT_NEAR(o.series("dissipation").front() / 363.14580523510, 1, off) << triangles;
+    }
+}
+
+TEST(MotionRun, RowsStateTheLargestErrorUntilThen) {
+    const Outcome o = run_case(wavy, {"model.kind=fluid"});
+    const std::vector<double> errors = o.series("energy_error");
+    EXPECT_TRUE(std::is_sorted(errors.begin(), errors.end()));
+    EXPECT_GE(errors.back(), o.summary.estimated_error * o.summary.reference_energy * (1 - 1e-12));
+}
+
+TEST(MotionRun, FixedStepsOfBdfBeginWithShortOnes) {
+    // Where the first two are as long as the others, of order 1 and 2, these energies are 4e-4 apart.
+    const auto energy = [](double step) {
+        return run_case(
+                   "energy = {k20 = 0.125, k42 = 0.05}\nmodel.kind = \"overdamped\"\naccuracy.estimate = false\n"
+                   "discretisation = {elements = 180, scheme = \"bdf\"}\ntime.end = 0.1\n[shape]\n"
+                   "kind = \"sphere\"\nradius = 1\n"
+                   "mode = [{l = 2, m = 1, amplitude = 0.2}, {l = 3, m = 2, amplitude = 0.1}]\n",
+                   {fmt::format("discretisation.step={}", step)})
+            .last("energy");
+    };
+    EXPECT_NEAR(energy(0.01), energy(0.005), 1e-5);
 }
 
 TEST(MotionSettings, SmoothnessIsTheOrderOfLinearInterpolation) {
@@ -732,6 +765,7 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
         if (s.stop.reason != Stop::interrupted) break;
         ASSERT_LT(++times, 100);
         in_first_pair += watch.rows.size() > 1 && detail(s, "pairs") == 1;
+        if (watch.frames.empty()) continue;  // before the first state
         // As a result file is rewound: to the checkpoint or to the last frame.
         const Record& at =
             watch.saved && watch.saved->time >= watch.frames.back().time ? *watch.saved : watch.frames.back();

@@ -67,6 +67,19 @@ TEST(SurfaceRun, EnergiesAreAsAccurateAsAsked) {
     expect_honest(run_case("kind = \"tube\"\nradius = 0.5\nlength = 2\n", {"accuracy.energy=1e-6"}), 2 * pi * 2 / 0.5);
 }
 
+TEST(SurfaceRun, ErrorsOfSmoothShapesAreWithinAFactorOfTenOfTheirEstimates) {
+    // The exact integral is that of common/geometry.
+    const std::string ellipsoid = "kind = \"ellipsoid\"\na = 1\nb = 1.3\nc = 0.7\n";
+    const double exact = integral_K2(Ellipsoid{1, 1.3, 0.7});
+    for (const int order : {2, 3, 4}) {
+        const Outcome o = run_case(ellipsoid, {"energy.k20=0", "energy.k42=1", "discretisation.elements=5120",
+                                               fmt::format("discretisation.order={}", order)});
+        const double error = std::abs(o.summary.energy - exact) / o.summary.reference_energy;
+        EXPECT_LT(error, o.summary.estimated_error) << order;
+        EXPECT_GT(error, o.summary.estimated_error / 10) << order;
+    }
+}
+
 TEST(SurfaceRun, RecoveriesOfSecondOrderAreAsAccurateAsTheySay) {
     // On their first meshes they get better faster than that.
     struct Trial {

@@ -86,7 +86,7 @@ TEST(ErrorScale, AFormulaThatOverflowsIsRefused) {
         {.modulus = 1, .formula = std::make_shared<const Formula>(parse_formula("exp(H)", EnergyTerm::variables))}};
     EXPECT_EQ(reference_energy(c, -3, 100), 100);
     EXPECT_EQ(test::message_of([&] { reference_energy(c, HUGE_VAL, HUGE_VAL); }),
-              "case.toml:3:7: energy.term.0.formula must be finite on the start, but it overflows there");
+              "case.toml:3:7: energy.term.0.formula must be finite on the initial shape, but it overflows there");
 }
 
 TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {
@@ -96,7 +96,7 @@ TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {
     EXPECT_EQ(doubt_before(c, -1, 100), "");
     EXPECT_NE(doubt_before(c, 0.9, 100), "");
     EXPECT_EQ(doubt_after(c, Stop::finished, 10, 9, 100), "");
-    EXPECT_NE(doubt_after(c, Stop::finished, 10, 9.1, 100).find("ask for less than 0.009"), std::string::npos);
+    EXPECT_NE(doubt_after(c, Stop::finished, 10, 9.1, 100).find("set accuracy.energy below 0.009"), std::string::npos);
     EXPECT_EQ(doubt_after(c, Stop::pinch_off, 10, 9.1, 100), "");
     EXPECT_EQ(doubt_after(c, Stop::finished, 10, 10, 100), "") << "it was at rest";
 }

@@ -113,7 +113,8 @@ RunSummary on_triangles(const Problem& c, const surface3d::Start& start, Surface
         part.discard();
         return surface3d::run(c, start, part, nullptr);
     }
-    s.details.emplace_back("triangles", fmt::format("{}, since the start is smooth", surface3d::least_triangles));
+    s.details.emplace_back("triangles",
+                           fmt::format("{}, since the initial shape is smooth", surface3d::least_triangles));
     return s;
 }
 
@@ -121,9 +122,11 @@ RunSummary on_triangles(const Problem& c, const surface3d::Start& start, Surface
 std::string why_axisymmetric(const Problem& c, const NoiseGrowth& growth) {
     const NoiseGrowth::Peak peak = growth.largest();
     if (peak.amplitude <= c.automatic.noise * (1 + 1e-12))
-        return fmt::format("start and model are axisymmetric, and no mode grows (m = 1 to {})", growth.modes());
+        return fmt::format("the initial shape and the model are axisymmetric, and no mode grows (m = 1 to {})",
+                           growth.modes());
     return fmt::format(
-        "start and model are axisymmetric, and modes m > 0 stay small: at most {} (m = {} at t = {:.6g})",
+        "the initial shape and the model are axisymmetric, and modes m > 0 stay small: at most {} (m = {} at t = "
+        "{:.6g})",
         percent(peak.amplitude), peak.m, peak.time);
 }
 
@@ -258,7 +261,7 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
     const int m = known.m;
     std::vector<double> amplitudes = amplitudes_of(at);
     const double largest = amplitudes.at(m - 1);
-    const std::string reason = fmt::format("a wave with m = {} grows from {:.3g} to {} at t = {:.6g}", m,
+    const std::string reason = fmt::format("the non-axisymmetric mode m = {} grows from {:.3g} to {} at t = {:.6g}", m,
                                            case_.automatic.noise, percent(largest), at.time);
     file_.note(fmt::format("from tier axisym to surface3d: {}", reason));
     for (double& a : amplitudes)

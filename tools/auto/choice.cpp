@@ -22,21 +22,22 @@ bool few_triangles_do(const Problem& c, const surface3d::Start& start) {
     const surface3d::StartMesh mesh = start.mesh(surface3d::least_triangles, c.element_order);
     const surface3d::Observables o = surface3d::observe_start(c, mesh);
     const double energy = surface3d::free_energy(c, o, mesh.mesh.period);
-    return surface3d::error_of_start(c, start, surface3d::least_triangles, energy) <=
+    return surface3d::error_of_start(c, start, surface3d::least_triangles, energy, false) <=
            few_start * surface3d::reference_energy(c, o, mesh.mesh.period);
 }
 
 Choice choice_for(const Problem& c) {
     if (const auto [key, complaint] = not_axisymmetric(c.shape); !key.empty())
         return {false,
-                fmt::format("the start is not axisymmetric: {} {}", key,
+                fmt::format("the initial shape is not axisymmetric: {} {}", key,
                             std::holds_alternative<MeshFile>(c.shape) ? "is a mesh" : "breaks the symmetry"),
                 surface3d::Start(c.of_surface())};
     if (std::holds_alternative<ResultFrame>(c.shape))
         if (surface3d::Start start(c.of_surface()); !start.resizable())
-            return {false, "the start is not axisymmetric: the frame of shape.path is a surface in three dimensions",
+            return {false,
+                    "the initial shape is not axisymmetric: the frame of shape.path is a surface in three dimensions",
                     std::move(start)};
-    return {true, "start and model are axisymmetric", {}};
+    return {true, "the initial shape and the model are axisymmetric", {}};
 }
 
 }  // namespace tubule

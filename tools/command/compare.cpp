@@ -215,7 +215,7 @@ double turn_of(const compare::RigidMotion& motion) {  // degrees
 
 void add_side(Text& out, char letter, const Side& side) {
     add(out, "{}  {}: {} at t = {:.8g}, {} rows", letter, side.path, side.stop, side.stop_time, side.rows);
-    if (side.stated_error) add(out, "; error of the energy as stated {:.2g} of E_ref", *side.stated_error);
+    if (side.stated_error) add(out, "; estimated error of the energy {:.2g} of E_ref", *side.stated_error);
     add(out, "\n");
 }
 

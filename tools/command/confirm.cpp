@@ -105,12 +105,12 @@ std::string waves(const std::set<int>& m) {
 
 std::string words_of_equilibria(const std::vector<ConfirmedPoint>& points) {
     std::string out;
-    add(out, "{:>7}  {:8}  {:12}  {:>12}  {:>9}  {:>8}  {:>10}  {:>10}  {:>3}  {:>9}  {:>9}  {}\n", "point", "why",
-        "shape", "energy", "dE/E_ref", "stated", "grow: m", "in 3D", "m", "rate", "in 3D", "verdict");
+    add(out, "{:>7}  {:8}  {:12}  {:>12}  {:>9}  {:>10}  {:>10}  {:>10}  {:>3}  {:>9}  {:>9}  {}\n", "point", "why",
+        "shape", "energy", "dE/E_ref", "est. error", "grow: m", "in 3D", "m", "rate", "in 3D", "verdict");
     for (const ConfirmedPoint& p : points) {
         const confirm::EquilibriumEnd& e = p.equilibrium;
-        add(out, "{:>7}  {:8}  {:12}  {:>12.7g}  {:>9}  {:>8}  {:>10}  {:>10}  {:>3}  {:>9}  {:>9}  {}\n", p.pick.point,
-            name(p.pick.why), name(p.axisymmetric.outcome), e.axisym_energy, shown(e.energy_difference),
+        add(out, "{:>7}  {:8}  {:12}  {:>12.7g}  {:>9}  {:>10}  {:>10}  {:>10}  {:>3}  {:>9}  {:>9}  {}\n",
+            p.pick.point, name(p.pick.why), name(p.axisymmetric.outcome), e.axisym_energy, shown(e.energy_difference),
             shown(e.energy_error), waves(e.axisym_growing), waves(e.growing), e.m, shown(e.axisym_rate), shown(e.rate),
             name(e.verdict));
     }

@@ -461,7 +461,7 @@ void add_run(CLI::App& app, int& exit_status) {
     command->add_flag("--quiet", o->quiet, "no progress; output only if something went wrong");
     command->add_flag("--expect", o->expect, "check [expect] of the case: exit status 0 if all of it came out, else 1");
     command->add_flag("--check-derivatives", o->check_derivatives,
-                      "first check the derivatives of the energy at the start");
+                      "first check the derivatives of the energy at the initial shape");
     end_help(
         *command,
         {"tubule run cases/figure_k42_006.toml -o figure.hdf",

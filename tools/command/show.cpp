@@ -267,7 +267,7 @@ int verify(const ShowOptions& options) {
     if (found.kind == Wholeness::Kind::foreign) read_case_text(options.file);  // which says what is wrong with it
     std::string words = found.damage;
     if (found.kind == Wholeness::Kind::unsealed)
-        words = "has no checksums, so whether it is as it was written cannot be told";
+        words = "has no checksums, so whether it is as it was written cannot be checked";
     try {
         if (words.empty() && !is_scan(options.file))
             require_result(options.file);  // other files have frames of it, too

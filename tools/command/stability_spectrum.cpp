@@ -88,7 +88,7 @@ std::string words_of(const std::vector<Found>& found, double kT) {
     for (const auto& [problem, spectrum, warm] : found) {
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words_of_model(problem));
         if (spectrum.at_rest())
-            add(out, "  at rest with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda);
+            add(out, "  stationary, with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda);
         else
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...\n", "rates");

@@ -67,7 +67,7 @@ SurfaceModes modes_of(const Problem& c) {
 std::string words_of(const SurfaceModes& found) {
     const auto value = [&](const char* name) { return found.values.at(name); };
     std::string out = "gradient flow\n";
-    add(out, "  at rest with energy {:.8g} +- {:.1e}, tension {:.8g}, pressure {:.8g}\n", value("energy"),
+    add(out, "  stationary, with energy {:.8g} +- {:.1e}, tension {:.8g}, pressure {:.8g}\n", value("energy"),
         value("energy_error"), value("tension"), value("pressure"));
     add(out, "  {:.0f} directions lower the energy under what is held\n", value("negative_directions"));
     out += words_of_modes(found.modes);

@@ -140,7 +140,7 @@ void set_tension(const TubeSubject& subject, ModelReport& report) {
     } else if (inextensible && !subject.waves.empty()) {
         report.tube.tension =
             theory::tension_of_waves(subject.tube, report.problem.law, subject.length, case_waves(subject));
-        report.tension_source = "keeps area and volume, given the waves at the start of the case";
+        report.tension_source = "keeps area and volume, given the modes of the initial shape";
     } else {
         report.tension_source =
             inextensible ? "not known without waves; choose with --tension" : "a gradient flow has none of its own";
@@ -262,10 +262,10 @@ std::string moduli(const Bending& energy) {
 std::string ill_posed_words(const UniformTube& tube) {
     const bool along = theory::ill_posed_along(tube), around = theory::ill_posed_around(tube);
     if (!along && !around) return "";
-    return fmt::format("ill-posed: waves {} grow the faster the shorter they are\n", along && around
-                                                                                         ? "of any direction"
-                                                                                     : along ? "along the axis"
-                                                                                             : "around the axis");
+    return fmt::format("ill-posed: short-wavelength modes {} grow the faster the shorter they are\n",
+                       along && around ? "of any direction"
+                       : along         ? "along the axis"
+                                       : "in the circumferential direction");
 }
 
 // ---- words

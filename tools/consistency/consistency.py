@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Both tiers on the same scenes: their differences, the convergence with the mesh width, and the cost.
+"""Both tiers on the same test cases: their differences, the convergence with the mesh width, and the cost.
 
     consistency.py TUBULE FOLDER [-o docs/consistency.md]     minutes; results are kept in FOLDER
     consistency.py TUBULE FOLDER --only figure --only rotation
@@ -125,11 +125,11 @@ def main(arguments, scenes):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tubule", type=Path, help="the program")
     parser.add_argument("folder", type=Path, help="for results; existing ones of this program are reused")
-    parser.add_argument("-o", "--output", type=Path, help="the page; needs all scenes")
-    parser.add_argument("--only", action="append", choices=[scene.name for scene in scenes], metavar="SCENE")
+    parser.add_argument("-o", "--output", type=Path, help="the page; needs all test cases")
+    parser.add_argument("--only", action="append", choices=[scene.name for scene in scenes], metavar="CASE")
     options = parser.parse_args(arguments)
     if options.only and options.output:
-        parser.error("a page needs all scenes: -o and --only exclude each other")
+        parser.error("a page needs all test cases: -o and --only exclude each other")
     program, failed, complaints = Program(options.tubule, options.folder, ELEMENTS), False, []
     for scene in scenes:
         if options.only and scene.name not in options.only:

@@ -105,11 +105,11 @@ MOVING_TUBES = [
     Scene("figure", "The figure's tube, gradient flow", "`cases/figure_k42_006.toml`.",
           motion, case("figure_k42_006"), 1e-8, 8e-5,
           within(1e-4, *ENERGIES) | within(1e-3, "dissipated") | within(2e-4, "area", "volume", *RADII, *SHAPES)),
-    *(Scene(f"waves-{kind}", f"Two waves on a tube, {name}", f"The start of `cases/surface_tube_waves_{kind}.toml`.",
+    *(Scene(f"waves-{kind}", f"Two waves on a tube, {name}", f"The initial shape of `cases/surface_tube_waves_{kind}.toml`.",
             motion, waves(kind, time={"end": 0.1, "output": [0.01, 0.03]}), 1e-7, 8e-5,
             within(5e-4, *ENERGIES) | within(1e-3, "dissipated", *RADII, *SHAPES) | within(2e-2, "speed") | within(5e-3, "lambda"))
       for kind, name in (("overdamped", "overdamped"), ("stokes", "Stokes flow"))),
-    Scene("waves-fluid", "Two waves on a tube, fluid", "The start of `cases/surface_tube_waves_fluid.toml`.",
+    Scene("waves-fluid", "Two waves on a tube, fluid", "The initial shape of `cases/surface_tube_waves_fluid.toml`.",
           motion, waves("fluid", time={"end": 0.2, "output": [0.05, 0.1]}), 1e-7, 8e-5,
           within(1e-4, *ENERGIES, "kinetic_energy", "dissipated") | within(1e-3, *RADII, *SHAPES)
           | within(2e-2, "speed") | within(5e-3, "lambda")),
@@ -123,12 +123,12 @@ MOVING_CELLS = [
     Scene("spheroid-fluid", "The spheroid as a fluid", "Re = 1.",
           motion, spheroid(time={"end": 0.1, "output": [0.02, 0.05]}), 1e-6, 8e-5,
           within(2e-4, *ENERGIES, "kinetic_energy", "dissipated") | within(2e-3, *SHAPES) | within(0.3, "speed", "lambda")),
-    Scene("capsule-fluid", "The capsule as a fluid: a start with discontinuous curvature", "`cases/capsule_fluid.toml`.",
+    Scene("capsule-fluid", "The capsule as a fluid: initial curvature with jumps", "`cases/capsule_fluid.toml`.",
           motion, case("capsule_fluid", time={"end": 0.05, "output": [0.01, 0.02]}), 5e-3, 8e-5,
           within(1e-2, "energy", "kinetic_energy", "dissipated", *SHAPES), must_fall=False),
     Scene("capsule-equilibrium", "The capsule's equilibrium",
-          "The cell l = 2, k42 = 0.06: at rest by Newton's method, compared with overdamped motion in 3D to t = 3. "
-          "The error is the distance of tier 1 from rest at that time.",
+          "The cell l = 2, k42 = 0.06, by Newton's method, compared with overdamped motion in 3D to t = 3. "
+          "Its error: how far the same motion in tier 1 is from equilibrium at that time.",
           at_equilibrium, case("equilibrium_capsule", shape={"length": 2.0}, equilibrium={"modes": 0}),
           case("capsule_overdamped", time={"end": 3.0, "output": [], "stationary": None}), within(2e-5, *ENERGIES), 2e-4),
 ]  # fmt: skip

@@ -215,7 +215,7 @@ std::string words(const Forecast& f) {
     out += f.seconds ? (*f.seconds < 1 ? "less than a second" : "about " + duration(*f.seconds))
                      : "the time cannot be estimated: set time.limit";
     out += fmt::format(", {} MB", rounded(f.bytes / 1e6));
-    return out + (f.finer_runs ? "; the motion is rough: finer runs may follow, each at least twice as long" : "");
+    return out + (f.finer_runs ? "; the motion is not smooth: finer runs may follow, each at least twice as long" : "");
 }
 
 }  // namespace tubule

@@ -60,10 +60,11 @@ std::optional<CaseError> formula_without_value(const Problem& c, const surface3d
         const double H = start.exact->H[i], K = start.exact->K[i];
         const CurvatureJet<double> f = density(c.energy, H, K);
         if (!std::isfinite(f.f + f.H + f.K + f.HH + f.HK + f.KK))
-            return complaint(c, key,
-                             fmt::format("must be finite on the start, but at {}, where H = {:.4g} and K = {:.4g}, it "
-                                         "or a derivative of it overflows",
-                                         place_of(start.mesh.nodes[i]), H, K));
+            return complaint(
+                c, key,
+                fmt::format("must be finite on the initial shape, but at {}, where H = {:.4g} and K = {:.4g}, it "
+                            "or a derivative of it overflows",
+                            place_of(start.mesh.nodes[i]), H, K));
     }
     return std::nullopt;
 }
@@ -86,7 +87,7 @@ CaseError ill_posed_complaint(const Problem& c, const std::string& outcome, cons
     const std::string key = key_of_ill_posed(c);
     return complaint(
         c, key,
-        fmt::format("makes the start ill-posed, {}: {}; {}", outcome, why,
+        fmt::format("makes the problem ill-posed at the initial shape, {}: {}; {}", outcome, why,
                     key == "energy.k20" ? "it must be above 0, unless energy.k40 or energy.k42 make up for it"
                     : key == "energy"   ? "bring its moduli nearer to 0, or make energy.k20 larger"
                                         : "bring it nearer to 0, or make energy.k20 larger"));

@@ -143,7 +143,7 @@ std::string untold(const Problem& c, const Choice& choice) {
     if (law.reservoir || law.free_period || !law.without_loads())
         return "loads, a reservoir or a free period act on the membrane";
     if (c.energy.H0_varies() && !c.is_axisymmetric()) return "energy.H0 varies";
-    if (!choice.axisymmetric && !choice.start->resizable()) return "the start brings its own triangles";
+    if (!choice.axisymmetric && !choice.start->resizable()) return "the initial shape brings its own triangles";
     return {};
 }
 

@@ -86,10 +86,10 @@ private:
 StopReport failure_of(const Problem& c, const std::exception& error, std::optional<double> reached) {
     const std::string where = reached ? fmt::format("after t = {:.6g}", *reached) : "at the start";
     StopReport stop{Stop::solver_failed, reached.value_or(0), fmt::format("{} ({})", error.what(), where),
-                    "try another accuracy.energy or discretisation.elements, or a smoother shape"};
+                    "try another accuracy.energy or discretisation.elements, or a smoother initial shape"};
     if (dynamic_cast<const std::bad_alloc*>(&error)) {
         stop.message = fmt::format("memory ran out {}", where);
-        stop.advice = "ask for less accuracy (accuracy.energy) or fewer elements (discretisation.elements)";
+        stop.advice = "use a looser accuracy.energy or fewer elements (discretisation.elements)";
     }
     blame_extreme_numbers(c, stop);
     return stop;

@@ -121,7 +121,7 @@ def one(rng, box):
     if box.run("check", "--quick", case.name, *sets, statuses=(0, 2)).status == 2:
         return "without time.limit"
     ran = box.run("run", case.name, *sets, "--overwrite", "-o", "case.hdf")
-    if "must be defined on the start" in ran.err:
+    if "must be defined on the initial shape" in ran.err:
         return "energy undefined"  # `--quick` computes no curvatures
     if ran.status == 2:
         raise Finding("run-refuses", f"check accepts, run does not: {ran.err[:500]}")

@@ -27,7 +27,7 @@ class Series:
 @dataclass
 class Reference:
     """One of: a result, a run of its own, numbers (with what the errors are relative to, and how well they are known);
-    nothing: the run of the chart with the smallest stated error."""
+    nothing: the run of the chart with the smallest estimated error."""
 
     result: Path | None = None
     set: dict | None = None

@@ -234,7 +234,7 @@ def chart():
     option("--also", **many, help="key=value,key=value,...: further lines, with these keys set")
     option("--map", help="key=from:to:n: largest stable value of the key (a step), n values a decade, over the last --vary")
     option("--set", **many, help="override a key in all runs")
-    option("--reference", help="a result to measure errors against (default: the run with the smallest stated error)")
+    option("--reference", help="a result to measure errors against (default: the run with the smallest estimated error)")
     option("--quantity", help="series whose error is drawn (default: energy)")
     option("--times", type=listed(time), metavar="T1,T2,...", help="times of the errors, such as 0.05,0.1 (default: outputs and end)")
     option("-o", "--output", type=file_name, **many,

@@ -24,7 +24,7 @@ WORDS = {
     "K": "Gaussian curvature K",
     "u_n": "normal velocity, > 0: outward",
     "u_t": "velocity along the profile",
-    "u_theta": "velocity around the axis",
+    "u_theta": "azimuthal velocity",
     "p": "pressure p",
     "energy_density": "energy density f(H, K)",
 }
