@@ -94,7 +94,7 @@ void SurfaceSimulation::begin(const Start& from) {
     const bool moves = surface().law().inertia == 0 && traits().controls_steps;
     if (moves) set_moving();
     measure_state();
-    if (moves && is_reported()) now_.dissipation = initial_dissipation();
+    if (moves && is_reported() && !is_rough(now_.smoothness)) now_.dissipation = initial_dissipation();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_));
     update_error();  // the begin time is compared, too
@@ -123,10 +123,11 @@ void SurfaceSimulation::set_moving() {
 }
 
 // The force has noise of short wavelength on coarse meshes, which rules the dissipation of the velocity that it drives.
-// The velocity of an implicit step has the less of it the longer the step: twice the dissipation of a step less that of
-// one twice as long, for the steps where that changes least, or hardly.
+// The velocity of an implicit step has the less of it the longer the step. The dissipation is extrapolated from steps
+// tau and 4 tau to none, for the pair where that changes least from the pair before, or hardly. Where it changes by
+// much everywhere, noise rules all but the longest.
 double SurfaceSimulation::initial_dissipation() const {
-    constexpr double hardly = 0.01;
+    constexpr double hardly = 0.005, much = 0.1;
     constexpr int most_trials = 6;
     const auto after = [&](double tau) {
         const MotionState soon = scheme_->step(state_, tau).state;
@@ -134,15 +135,14 @@ double SurfaceSimulation::initial_dissipation() const {
         now.u = soon.u, now.w = soon.w, now.p = soon.p, now.lambda = soon.lambda, now.tension = soon.tension;
         return measure(surface(), now).dissipation;
     };
-    double best = now_.dissipation, extrapolated = best, least_change = HUGE_VAL;
+    double best = now_.dissipation, least_change = HUGE_VAL;
     try {
-        double tau = memory_.next_step / 4, of_step = after(tau);
-        for (int i = 0; i < most_trials; ++i) {
-            const double of_longer = after(tau *= 2), next = 2 * of_step - of_longer;
-            const double change = i > 0 ? std::abs(next - extrapolated) : HUGE_VAL;
-            extrapolated = next, of_step = of_longer;
-            if (change < least_change) best = next, least_change = change;
-            if (change <= hardly * next) break;
+        double tau = moment * memory_.next_step, of_step = best, before = 0;
+        for (int i = 0; i < most_trials && !(least_change <= hardly); ++i) {
+            const double of_longer = after(tau *= 4), extrapolated = (4 * of_step - of_longer) / 3;
+            const double change = i > 0 ? std::abs(extrapolated / before - 1) : HUGE_VAL;
+            if (change < least_change || least_change > much) best = extrapolated, least_change = change;
+            before = extrapolated, of_step = of_longer;
         }
     } catch (const SolveError&) {  // the first step says why
     }
