@@ -55,6 +55,14 @@ class Language(unittest.TestCase):
             if path.suffix in (".cpp", ".hpp", ".js", ".py") or (not path.suffix and path.read_text().startswith("#!/usr/bin/python3")):
                 self.expect_terms(path, literals(path, path.read_text()))
 
+    def test_pages_are_short(self):
+        """Words outside code blocks and tables that a test writes (between <!-- NAME --> and <!-- end -->)."""
+        left_out = re.compile(r"^<!-- [\w, ]+ -->$.*?^<!-- end -->$|^ *```.*?^ *```$", re.M | re.S)
+        words = {path: sum(any(map(str.isalnum, word)) for word in left_out.sub("", path.read_text()).split())
+                 for path in (TOP / "README.md", *(TOP / "docs").rglob("*.md"))}  # fmt: skip
+        self.assertLess(sum(words.values()), 66_500)
+        self.assertLess(sum(n for path, n in words.items() if path.parent.name == "decisions"), 12_001)
+
 
 if __name__ == "__main__":
     unittest.main()
