@@ -20,7 +20,8 @@ Scheme scheme_of(const Case& c, bool inertia) {
     return default_scheme(inertia);
 }
 
-// Of curved triangles. Those of a file are measured by fits through its points, which order 4 makes no better.
+// The order of curved triangles. Those of a file are measured by fits through its points, which order 4 makes no
+// better.
 int default_order(const Case& c) {
     const bool measured = !c.moves() && !c.equilibrium;
     return measured && std::holds_alternative<MeshFile>(c.shape) ? 3 : 4;

@@ -69,7 +69,7 @@ struct ShapeRow {
     double height, r_max, wall_seconds;
 };
 
-// Of the area.
+// The centre of the area.
 Eigen::Vector3d centre_of(const CurvedMesh& mesh) {
     const SurfaceSpace space(mesh);
     const auto moments = load<4>(space, mesh, [&](int, const CellColumns<3>& X, int q, CellColumns<4>& out) {

@@ -2,7 +2,7 @@
 
 E + tension A - pressure V is an integral of a function of the derivatives of the point (r cos phi, r sin phi, z), whose
 first and second derivatives SymPy finds. With them for displacements w(t) cos(m phi) along the normal, Newton's method
-finds shapes at rest (m = 0), and an eigenproblem the rates of gradient flow for each m.
+finds equilibrium shapes (m = 0), and an eigenproblem the rates of gradient flow for each m.
 """
 
 import functools
