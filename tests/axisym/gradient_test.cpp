@@ -67,8 +67,8 @@ TEST(Gradients, formsHaveTheirDerivatives) {
     EXPECT_THROW(CurveForms(CurveSpace(Topology::tube, equal_breaks(8), 3, 1, 3), energy), std::invalid_argument);
 }
 
-// INT |grad H|^2 dS of a torus and an ellipsoid by the trapezoidal rule in their own angles, exact to rounding; errors
-// of the splines are of order 2 (degree - 2): 2, 6 and 10.
+// Expected: INT |grad H|^2 dS of a torus and an ellipsoid by the trapezoidal rule in their own angles, exact to
+// rounding. Errors of the splines have order 2 (degree - 2): 2, 6 and 10.
 TEST(Gradients, energiesOfToriAndEllipsoids) {
     constexpr int points = 4000;
     double torus = 0, ellipsoid = 0;
