@@ -172,7 +172,7 @@ void keys(Keys& k, EquilibriumChoices& e, const Model& model, const Bending& ene
                 if (*b.parameter == vary_pressure && model.pressure_of_volume)
                     return "varies a formula: give a number, or vary something else";
                 return fixed || held == Held::reduced_volume
-                           ? "varies a load on what is held fixed: see equilibrium.held"
+                           ? "varies the tension or pressure of what is held: see equilibrium.held"
                            : "";
             }
             const bool is_held = *b.parameter == vary_area             ? area

@@ -47,7 +47,7 @@ const Property free_area{"model.area = \"free\" or \"reservoir\"", [](P p) { ret
     beads{"model.bead_width", [](P p) { return p.law.beads.has_value(); }},
     pulled{"model.period = \"free\" or model.bead_width", [](P p) { return p.law.free_period || p.law.beads; }},
     kept{"a fixed area or volume", [](P p) { return p.law.keeps_volume || !p.law.area_is_free(); }},
-    as_begun{"fixed area and period, without loads",
+    as_begun{"fixed area and period, without tension, pressure or force",
              [](P p) { return !p.law.reservoir && !p.law.free_period && p.law.without_loads(); }};
 
 // Shapes and energies.
@@ -80,7 +80,8 @@ const Property tube{"a tube", [](P p) { return may_have_period(p.shape); }},
     few_terms{"the terms k20, k40 and k42 alone", [](P p) { return term_beyond_paper(p.energy).empty(); }};
 
 // Discretisations.
-const Property graph{"a graph r(z): the gradient flow of a tube, free volume and area, constant loads", can_be_graph},
+const Property graph{"a graph r(z): the gradient flow of a tube, free volume and area, constant tension and pressure",
+                     can_be_graph},
     begun_as_graph{graph.words, begins_as_graph},
     along{"a flow along the membrane: an inextensible model, or H0 that varies",
           [](P p) { return p.law.inextensible || p.energy.H0_varies(); }},
@@ -165,9 +166,9 @@ const std::vector<Requirement> rows{
     value(
         "model.extension", [](P p) { return p.law.beads && p.law.beads->extension; }, {no_inertia},
         "the velocity would jump with its rate: give model.force"),
-    number("model.tension", varies(&MotionLaw::tension), {motion}, "equilibria are those of constant loads"),
-    number("model.pressure", varies(&MotionLaw::pressure), {motion}, "equilibria are those of constant loads"),
-    number("model.force", varies(&MotionLaw::force), {motion}, "equilibria are those of constant loads"),
+    number("model.tension", varies(&MotionLaw::tension), {motion}, "equilibria are those of a constant value"),
+    number("model.pressure", varies(&MotionLaw::pressure), {motion}, "equilibria are those of a constant value"),
+    number("model.force", varies(&MotionLaw::force), {motion}, "equilibria are those of a constant value"),
     number(
         "model.extension", [](P p) { return p.law.beads && p.law.beads->change(); }, {motion},
         "equilibria have a constant distance"),

@@ -130,7 +130,7 @@ TEST(EquilibriumCase, refusals) {
     clash("pressure = 0.1", "reduced-volume", "leave the volume free: see model.pressure");
     expect("modes = 1\n[equilibrium.branch]\nvary = \"energy.k42\"",
            "held = \"area\"\n[equilibrium.branch]\nvary = \"model.tension\"",
-           "14:1: equilibrium.branch varies a load on what is held fixed: see " + held);
+           "14:1: equilibrium.branch varies the tension or pressure of what is held: see " + held);
     expect("to = 0.0", "to = 0.12",
            "14:1: equilibrium.branch from 0.12 to 0.12 by 0.05 makes 0 steps; the number must be 1 to 10000");
     expect("step = 0.05", "step = 1e-9",

@@ -74,7 +74,7 @@ class ModelChoice(ProgramTest):
         quick = ("time.end=0.02", "time.output=[]")
         for given, why in (
             (("velocity.initial=rotation", "velocity.omega=0.1"), "the case gives a velocity"),
-            (("model.volume=free", "model.pressure=0.1"), "loads, a reservoir or a free period act on the membrane"),
+            (("model.volume=free", "model.pressure=0.1"), "a tension, pressure or force, a reservoir or a free period acts on the membrane"),
         ):
             self.assertEqual(self.chosen(*quick, *given), ("fluid", f"whether a simpler model does is unknown: {why}"))
 

@@ -528,7 +528,7 @@ class Shown(ScanTest):
                 line = file["thresholds/pearling"]
                 found, first, second = (line[name][()] for name in ("values", "first", "second"))
                 buckling = file["thresholds/buckling/values"][()]
-                self.assertNotIn("rings", file["thresholds"])
+                self.assertNotIn("ovalisation", file["thresholds"])
             x = (2 * np.pi * n / L[first, None]) ** 2
             c = -2 + alpha * (2 * np.pi * L[first, None] + M0) / (2 * k20)
             for j, k in enumerate(k42[second]):

@@ -135,13 +135,13 @@ class Stability(ProgramTest):
         self.assertIn("fastest of all with m = 0: q = 1.118034 (length 5.61985), rate 0.1\n", out)
         self.assertIn("beyond the threshold of: pearling\n", out)
         self.assertIn("no wave with m = 0 grows for k42 >= 0\n", out)
-        # theory.md (5.23), (5.24) at c = -1: buckling below the reduced tension 0, rings below -3; the tension is 2 k20
+        # theory.md (5.23), (5.24) at c = -1: buckling below the reduced tension 0, ovalisation below -3; the tension is 2 k20
         # times that.
         lines = [line.split() for line in out.splitlines()]
         buckling = next(line for line in lines if line[:2] == ["buckling", "1"])
         self.assertAlmostEqual(float(buckling[4]), 0, delta=1e-12)
-        rings = next(line for line in lines if line[:2] == ["rings", "2"])
-        self.assertAlmostEqual(float(rings[4]), -3 * 0.4, delta=1e-9)
+        ovalisation = next(line for line in lines if line[:2] == ["ovalisation", "2"])
+        self.assertAlmostEqual(float(ovalisation[4]), -3 * 0.4, delta=1e-9)
 
     def test_a_frozen_wave_is_neutral(self):
         # Area, volume and length are fixed, which freezes the only wave: docs/theory.md, section 5.

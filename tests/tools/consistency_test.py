@@ -71,7 +71,7 @@ class Page(unittest.TestCase):
 
     def test_files(self):
         scenes = []
-        for name, words in (("figure", "Words."), ("sphere-at-rest", ""), ("rates-fluid", "")):
+        for name, words in (("figure", "Words."), ("sphere-shape", ""), ("rates-fluid", "")):
             scenes.append(Scene(name, f"The {name}", words, None))
             scenes[-1].rows, scenes[-1].cost = [row({100: 1.6e-3, 400: 1e-4})], {None: 0.5, 100: 1, 400: 20}
         with tempfile.TemporaryDirectory() as folder:
@@ -88,7 +88,7 @@ class Page(unittest.TestCase):
 
 
 class Suite(unittest.TestCase):
-    SCENE = next(scene for scene in SCENES if scene.name == "spheroid-at-rest")  # the cheapest
+    SCENE = next(scene for scene in SCENES if scene.name == "spheroid-shape")  # the cheapest
 
     def called(self, measure):
         scene = Scene(self.SCENE.name, self.SCENE.title, "", measure)
@@ -111,7 +111,7 @@ class Suite(unittest.TestCase):
 
         status, _, err = self.called(stricter)
         self.assertEqual(status, 1)
-        self.assertRegex(err, r"^consistency: A spheroid, at rest: volume differs by .*, more than 1e-12\n$")
+        self.assertRegex(err, r"^consistency: Initial shape: a spheroid: volume differs by .*, more than 1e-12\n$")
 
     def test_a_run_that_fails(self):
         status, _, err = self.called(lambda program: program.run({"tier": "axisym"}, "a bad case"))

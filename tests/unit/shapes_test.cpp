@@ -162,7 +162,7 @@ TEST(ModelKeys, WhatGoesTogether) {
               "case.toml:12:1: missing key velocity.omega: a finite number");
     EXPECT_EQ(tube("kind = \"fluid\"\n", "[discretisation]\nparametrisation = \"graph\"\n"),
               "case.toml:13:19: discretisation.parametrisation must not be \"graph\": only valid with a graph r(z): "
-              "the gradient flow of a tube, free volume and area, constant loads");
+              "the gradient flow of a tube, free volume and area, constant tension and pressure");
     EXPECT_EQ(tube("kind = \"gradient-flow\"\n", "[discretisation]\nparametrisation = \"material\"\n"),
               "case.toml:13:19: discretisation.parametrisation must not be \"material\": only valid with a flow along "
               "the membrane: an inextensible model, or H0 that varies");

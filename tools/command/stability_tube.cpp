@@ -84,7 +84,7 @@ std::vector<double> wave_numbers(const std::string& text) {
 // ---- answers
 
 std::string instability(int m) {
-    return m == 0 ? "pearling" : m == 1 ? "buckling" : m == 2 ? "rings" : fmt::format("{} waves around", m);
+    return m == 0 ? "pearling" : m == 1 ? "buckling" : m == 2 ? "ovalisation" : fmt::format("m = {}", m);
 }
 
 std::vector<Threshold> thresholds(const UniformTube& tube, int last) {

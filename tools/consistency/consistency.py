@@ -18,12 +18,12 @@ from measures import Failed, Program
 from scenes import EXTREMES, SCENES
 
 ELEMENTS = (80, 180, 320)  # of spheres: icosahedra whose edges are cut in 2, 3, 4
-AT_REST = ("tube-at-rest", "spheroid-at-rest")
+INITIAL_SHAPES = ("tube-shape", "spheroid-shape")
 INERTIAL = ("waves-fluid", "rotation", "spheroid-fluid")
 MOVING = ("figure", "waves-overdamped", "waves-stokes", *INERTIAL)
 COLOURS = ("#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7")  # of Okabe and Ito; then dashed
 PANELS = (
-    ("energy at rest", "-at-rest", lambda row: row.quantity == "energy"),
+    ("energy of initial shapes", "-shape", lambda row: row.quantity == "energy"),
     ("rates of small waves", "rates-", lambda row: bool(row.found)),
     ("energy in motion, largest", "", lambda row: row.quantity == "energy" and len(row.times) > 1),
 )
@@ -67,8 +67,8 @@ def head(scenes):
 
     return (Path(__file__).parent / "page.txt").read_text().format(
         minutes=sum(sum(scene.cost.values()) for scene in scenes) / 60,
-        at_rest=largest(AT_REST, "area", "volume", "energy", "energy_20", "energy_40", "energy_42", "integral_K"),
-        extremes=largest(AT_REST, *EXTREMES),
+        initial=largest(INITIAL_SHAPES, "area", "volume", "energy", "energy_20", "energy_40", "energy_42", "integral_K"),
+        extremes=largest(INITIAL_SHAPES, *EXTREMES),
         rates=largest([scene.name for scene in scenes if scene.name.startswith("rates-")]),
         motion=largest(MOVING, "energy"),
         figure=largest(("figure",), "energy"),
@@ -78,7 +78,7 @@ def head(scenes):
         noise_fine=largest(("tube-begins",), "overdamped, dissipation"),
         waves=largest(("tube-begins",), "overdamped, wave 1", "overdamped, wave 2"),
         pointwise=largest(INERTIAL, "speed", "lambda"),
-        seams=largest(("capsule-at-rest",), "energy"),
+        seams=largest(("capsule-shape",), "energy"),
         capsule=largest(("capsule-fluid",), "energy"),
         capsule_known=largest(("capsule-fluid",), "energy", what=lambda row: row.error),
         dissipated=largest(MOVING, "dissipated"),
@@ -96,7 +96,7 @@ def draw(scenes, path):
     for axes, (title, part, wanted) in zip(panels, PANELS):
         rows = [(scene, row) for scene in scenes for row in scene.rows if part in scene.name and wanted(row)]
         for i, (scene, row) in enumerate(rows):
-            name = scene.name.removesuffix("-at-rest").removeprefix("rates-")
+            name = scene.name.removesuffix("-shape").removeprefix("rates-")
             axes.loglog(row.meshes, [row.difference(t) for t in row.meshes], color=COLOURS[i % len(COLOURS)],
                         label=f"{name} {row.quantity}" if part == "rates-" else name, ls=("-", "--")[i // len(COLOURS) % 2],
                         marker=style.MARKERS[i % len(style.MARKERS)])  # fmt: skip
@@ -113,7 +113,8 @@ def draw(scenes, path):
 
 def write(path, scenes):
     """Writes the page and, beside it, the same name with .csv and .svg."""
-    parts = (f"## {scene.title}\n\n{textwrap.fill(scene.words, 118)}\n\n{table(scene)}\n" for scene in scenes)
+    parts = (f"## {scene.title}\n\n{textwrap.fill(scene.words, 118)}\n\n<!-- numbers -->\n\n{table(scene)}\n\n<!-- end -->\n"
+             for scene in scenes)  # fmt: skip
     path.write_text("\n".join([head(scenes), *parts]))
     with open(path.with_suffix(".csv"), "w") as file:
         csv.writer(file, lineterminator="\n").writerows(numbers(scenes))

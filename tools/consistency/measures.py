@@ -204,7 +204,7 @@ class Program:
         return rows
 
 
-def at_rest(program, start, exact, bounds, accuracy=1e-9, mesh="uniform", must_fall=True):
+def initial_shape(program, start, exact, bounds, accuracy=1e-9, mesh="uniform", must_fall=True):
     """Geometry and energies of an initial shape. `exact`: values in closed form; all others are from the first row and frame
     of tier 1. In 3D the surface does not move, so curvatures are those of the patch recovery."""
     fine, loose = program.fine_and_loose(changed(start, time={"end": 1e-6, "output": []}), accuracy)
@@ -308,7 +308,7 @@ def motion(program, start, accuracy, tolerance, bounds, must_fall=True):
 def at_equilibrium(program, resting, moving, bounds, tolerance):
     """An equilibrium of tier 1 by Newton's method, and the final shape of a run in 3D. The error is the distance of a run of
     tier 1 from the equilibrium at that time."""
-    rest = program.run(resting, "tier 1, at rest")
+    rest = program.run(resting, "tier 1, in equilibrium")
     end, moved = moving["time"]["end"], program.axisym(moving)
     rows = []
     for name, bound in bounds.items():

@@ -1,9 +1,9 @@
-"""The scenes of docs/consistency.md. A bound is three times what was found, or so, or what is asked of the program: it
+"""The test cases of docs/consistency.md. A bound is three times what was found, or so, or what is asked of the program: it
 is there to notice when the tiers part, not to measure them."""
 
 import math
 
-from measures import SHAPES, at_equilibrium, at_rest, beginnings, case, changed, motion, rates
+from measures import SHAPES, at_equilibrium, beginnings, case, changed, initial_shape, motion, rates
 
 
 class Scene:
@@ -35,8 +35,8 @@ def waves(model, **changes):
     return changed(case(f"tube_waves_{model}"), shape=WAVY, **changes)
 
 
-def tube_at_rest(kind, end, square=3.0, **energy):
-    """A tube at rest (H0 = -1/R), for small waves; `square`: q^2 R^2 of n = 1."""
+def equilibrium_tube(kind, end, square=3.0, **energy):
+    """A tube in equilibrium (H0 = -1/R), for small waves; `square`: q^2 R^2 of n = 1."""
     viscous = {"Re": 2.0, "gamma": 0.3} if kind == "stokes" else {}
     return {
         "tier": "axisym",
@@ -57,18 +57,18 @@ ENERGIES = ("energy", "energy_20", "energy_42")
 INTEGRALS = ("area", "volume", *ENERGIES, "integral_K")
 RADII = ("r_min", "r_max")
 
-AT_REST = [
-    Scene("tube-at-rest", "A tube with three waves, at rest",
+INITIAL_SHAPES = [
+    Scene("tube-shape", "Initial shape: a tube with three waves",
           "`cases/three_modes.toml` at t = 0: k20, k40 and k42, no symmetry. INT K is 0.",
-          at_rest, case("three_modes"), {"integral_K": 0.0},
+          initial_shape, case("three_modes"), {"integral_K": 0.0},
           within(2e-5, "area", "volume", "energy", "energy_20", "energy_40", "energy_42", "integral_K") | within(3e-2, *EXTREMES)),
-    Scene("spheroid-at-rest", "A spheroid, at rest",
+    Scene("spheroid-shape", "Initial shape: a spheroid",
           "Half axes 0.5, 0.5, 1; energy of `cases/capsule_fluid.toml`. INT K is 4 pi.",
-          at_rest, spheroid(), {"integral_K": 4 * math.pi}, within(1e-5, *INTEGRALS) | within(1e-2, *EXTREMES)),
-    Scene("capsule-at-rest", "A capsule, at rest: discontinuous curvature",
+          initial_shape, spheroid(), {"integral_K": 4 * math.pi}, within(1e-5, *INTEGRALS) | within(1e-2, *EXTREMES)),
+    Scene("capsule-shape", "Initial shape: a capsule, whose curvature jumps",
           "`cases/capsule_fluid.toml` at t = 0, graded triangles. All values are closed forms: H is -4 on the caps and -2 on the cylinder, "
           "K 4 and 0.",
-          at_rest, case("capsule_fluid"),
+          initial_shape, case("capsule_fluid"),
           {"integral_K": 4 * math.pi, "area": 3 * math.pi, "volume": 2 / 3 * math.pi, "energy": 4 * math.pi * 0.365,
            "min H": -4.0, "max H": -2.0, "max K": 4.0},
           within(2e-5, "area", "volume") | within(1e-2, "energy") | within(1e-3, "integral_K") | within(None, "min H", "max H", "max K"),
@@ -89,16 +89,16 @@ BEGINNINGS = [
 
 RATES = [
     *(Scene(f"rates-{kind}", f"Rates of small waves (n, m), {kind}",
-            "A tube at rest, k20 = 0.5, k42 = 0.05, H0 = -1/R, volume free, q^2 R^2 = 3 for n = 1"
+            "A tube in equilibrium, k20 = 0.5, k42 = 0.05, H0 = -1/R, volume free, q^2 R^2 = 3 for n = 1"
             + ("; Re = 2, gamma = 0.3." if kind == "stokes" else "."),
-            rates, tube_at_rest(kind, 0.1), THREE, within(1e-3, *THREE) | within(3e-5, "tier 1"), 0.0015, more)
+            rates, equilibrium_tube(kind, 0.1), THREE, within(1e-3, *THREE) | within(3e-5, "tier 1"), 0.0015, more)
       for kind, more in (("gradient-flow", [1000]), ("overdamped", []), ("stokes", []))),
     Scene("rates-pearling", "Rate of a growing wave: pearling, gradient flow",
           "The same with k20 = 2.5, k42 = -0.5 and q^2 R^2 = 1.25.",
-          rates, tube_at_rest("gradient-flow", 0.5, 1.25, k20=2.5, k42=-0.5), [(1, 0)], within(1e-3, (1, 0)) | within(3e-5, "tier 1"), 0.01),
+          rates, equilibrium_tube("gradient-flow", 0.5, 1.25, k20=2.5, k42=-0.5), [(1, 0)], within(1e-3, (1, 0)) | within(3e-5, "tier 1"), 0.01),
     Scene("rates-buckling", "Rate of a growing wave: buckling, overdamped",
           "The same with H0 = -3/R: m = 1 grows, which tier 1 only shows in its spectrum.",
-          rates, tube_at_rest("overdamped", 0.1, H0=-3.0), [(1, 1)], within(1e-3, (1, 1)), 0.0015),
+          rates, equilibrium_tube("overdamped", 0.1, H0=-3.0), [(1, 1)], within(1e-3, (1, 1)), 0.0015),
 ]  # fmt: skip
 
 MOVING_TUBES = [
@@ -133,4 +133,4 @@ MOVING_CELLS = [
           case("capsule_overdamped", time={"end": 3.0, "output": [], "stationary": None}), within(2e-5, *ENERGIES), 2e-4),
 ]  # fmt: skip
 
-SCENES = [*AT_REST, *BEGINNINGS, *RATES, *MOVING_TUBES, *MOVING_CELLS]
+SCENES = [*INITIAL_SHAPES, *BEGINNINGS, *RATES, *MOVING_TUBES, *MOVING_CELLS]

@@ -141,7 +141,7 @@ std::string untold(const Problem& c, const Choice& choice) {
     const MotionLaw& law = c.law;
     if (c.velocity.initial != InitialVelocity::rest) return "the case gives a velocity";
     if (law.reservoir || law.free_period || !law.without_loads())
-        return "loads, a reservoir or a free period act on the membrane";
+        return "a tension, pressure or force, a reservoir or a free period acts on the membrane";
     if (c.energy.H0_varies() && !c.is_axisymmetric()) return "energy.H0 varies";
     if (!choice.axisymmetric && !choice.start->resizable()) return "the initial shape brings its own triangles";
     return {};

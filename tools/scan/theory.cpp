@@ -55,8 +55,8 @@ std::optional<double> shortest_unduloid(const Problem& c) {
     return period ? std::optional(*period * std::abs(c.energy.H0) - 4) : std::nullopt;
 }
 
-// The straight tube at rest. Gradient flow with free volume and without loads: radius 1/|H0|, if no term but k20
-// affects it. With loads that are constant and a radius that nothing keeps: where the radius of the start goes.
+// The straight tube in equilibrium. Gradient flow with free volume and no forces: radius 1/|H0|, if no term but k20
+// affects it. With constant forces and a radius that nothing keeps: where the initial radius goes.
 // Otherwise the straight tube of the start; nothing if a fixed area and volume make the tension an unknown.
 std::optional<theory::UniformTube> tube_at_rest(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
@@ -157,7 +157,7 @@ const std::vector<Threshold>& thresholds() {
         {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
         {"pearling", "straight tube, m = 0 neutral", waves_around<0>},
         {"buckling", "straight tube, m = 1 neutral", waves_around<1>},
-        {"rings", "straight tube, m = 2 neutral", waves_around<2>},
+        {"ovalisation", "straight tube, m = 2 neutral", waves_around<2>},
         {"two_spheres", "two spheres with a neck", two_spheres},
         {"sphere_in_sphere", "sphere in a sphere", sphere_in_sphere}};
     return all;

@@ -194,7 +194,7 @@ Paper::Paper(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bendi
     if (law.inertia == 0 && law.friction == 0)
         throw std::invalid_argument("the paper's scheme needs gamma > 0 for stokes: rigid motions are undetermined");
     if (law.reservoir || law.free_period || !law.without_loads())
-        throw std::invalid_argument("the paper's scheme has no reservoir, no free period, and no loads");
+        throw std::invalid_argument("the paper's scheme has no reservoir, free period, tension, pressure or force");
     if (!(control.smoothing >= 0))
         throw std::invalid_argument(
             fmt::format("the smoothing parameter eps of curvatures must be >= 0, not {:g}", control.smoothing));

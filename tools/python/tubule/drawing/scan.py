@@ -55,7 +55,7 @@ QUANTITIES = {
     "tension": "tension",
     "pressure": "pressure",
     "growth": "largest growth rate",
-    "free_energy": "energy with that of loads",
+    "free_energy": "free energy F",
     "limit_energy": "energy of the vesiculated limit",
     "steps": "steps",
     "elements": "elements",

@@ -16,7 +16,7 @@ def curve_label(m):
 
 
 def largest_shown(curves):
-    """The largest rate, at least 0. Without friction, rates of rings grow beyond all bounds at long waves; then four times
+    """The largest rate, at least 0. Without friction, m = 2 grows beyond all bounds at long waves; then four times
     the largest rate of shorter waves."""
     of_all = [rate for curve in curves for rate in curve["rate"] if rate is not None]
     of_short = [r for curve in curves for r in curve["rate"][len(curve["rate"]) // 2 :] if r is not None]
@@ -29,7 +29,7 @@ def rate_limits(models):
     limits = []
     for model in models:
         top = largest_shown(model["curves"])
-        # Rings may be infinitely fast without friction, so m = 0 sets the scale.
+        # Ovalisation may be infinitely fast without friction, so m = 0 sets the scale.
         lowest = min([rate for rate in model["curves"][0]["rate"] if rate is not None], default=-1.0)
         bottom = max(lowest, -2.0 * top) if top > 0 else lowest / 4
         limits.append((1.06 * bottom, 1.25 * top if top > 0 else -0.12 * bottom))
