@@ -42,7 +42,7 @@ install(DIRECTORY cases DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule
 install(PROGRAMS tools/slurm/tubule.sbatch DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule/slurm)
 install(DIRECTORY docs/schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/tubule FILES_MATCHING PATTERN "*.json")
 install(DIRECTORY tools/python/tubule/drawing DESTINATION ${TUBULE_PYTHON_DIR}/tubule
-        FILES_MATCHING PATTERN "*.py" PATTERN "view.*")  # by itself, too, where there is no Python package
+        FILES_MATCHING PATTERN "*.py" PATTERN "view*")  # by itself, too, where there is no Python package
 install(FILES README.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tubule)
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/tubule PATTERN figures.json EXCLUDE PATTERN figures EXCLUDE)
 

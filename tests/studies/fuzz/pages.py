@@ -1,6 +1,6 @@
 """Pages of `tubule view` with titles and names of files that mean something to a browser, or to what makes the page.
 
-A page is taken apart as the HTML standard says, comments within scripts included: it has its three scripts and no more, the data
+A page is taken apart as the HTML standard says, comments within scripts included: it has its two scripts and no more, the data
 are JSON, with the title, and the program of the page is whole."""
 
 import html
@@ -15,7 +15,7 @@ from sandbox import Finding
 STUDY = 3
 DRAWING = Path(__file__).resolve().parents[3] / "tools/python/tubule/drawing"
 PIECES = (
-    "@DATA@", "@SCRIPT@", "@THREE@", "@TITLE@", "@LICENCE@", "<!--", "-->", "<script>", "</script>", "<SCRIPT ", "</title>", "<title>", "</", "<", ">", "&", "&lt;",
+    "@DATA@", "@SCRIPT@", "@TITLE@", "<!--", "-->", "<script>", "</script>", "<SCRIPT ", "</title>", "<title>", "</", "<", ">", "&", "&lt;",
     "&amp;#60;", '"', "'", "\\", "\\u003c", "\\n", "$&", "\\1", "{}", "%s", "\u2028", "\u2029", "\x7f", "\x85", "\u202e", "\U0001f9ea", "]]>", "*/", "//", "`${x}`", " ", "wave", "\n",
 )  # fmt: skip
 
@@ -50,19 +50,18 @@ def scripts(page):
 
 def judge(page, titles):
     found = scripts(page)
-    if len(found) != 3 or 'id="data"' not in found[0][0]:
+    if len(found) != 2 or 'id="data"' not in found[0][0]:
         raise Finding("page", f"{len(found)} scripts, of {[len(content) for _, content in found]} characters")
     try:
         data = json.loads(found[0][1])
     except json.JSONDecodeError as error:
         raise Finding("page", f"its data are no JSON: {error}; {found[0][1][:80]!r}") from error
-    if found[2][1].strip() != (DRAWING / "view.js").read_text(encoding="utf-8").strip():
-        raise Finding("page", "its script is not view.js")
+    names = ("view", "view_body", "view_shapes") if data["kind"] == "shapes" else ("view", "view_scan")
+    if found[1][1] != "\n".join((DRAWING / f"{name}.js").read_text(encoding="utf-8") for name in names):
+        raise Finding("page", f"its script is not that of {', '.join(names)}")
     head = re.search(r"<title>(.*?)</title>", page, re.S)
     if data["title"] not in titles or html.unescape(head[1]) != data["title"]:
         raise Finding("page", f"one title of {titles!r}: {data['title']!r} in its data, {head[1][:80]!r} in its head")
-    if data["kind"] == "shapes" and "THREE" not in found[1][1]:
-        raise Finding("page", "without the library that draws")
 
 
 def one(rng, box):

@@ -87,7 +87,7 @@ class Unpacked(unittest.TestCase):
     def test_manual_pages_and_completion_are_there(self):
         for path in ("share/man/man1/tubule.1.gz", "share/man/man1/tubule-run.1.gz", "share/zsh/vendor-completions/_tubule",
                      "share/bash-completion/completions/tubule", "share/tubule/cases/meshes/disc.off",
-                     "share/doc/tubule/docs/results.md", "lib/python3/dist-packages/tubule/drawing/view.js"):  # fmt: skip
+                     "share/doc/tubule/docs/results.md", "lib/python3/dist-packages/tubule/drawing/view_body.js"):  # fmt: skip
             self.assertTrue((self.root / "usr" / path).exists(), path)
 
 
@@ -126,7 +126,7 @@ class BareDebian(unittest.TestCase):
 
     def test_from_nothing_to_a_picture(self):
         self.inside("apt-get", "update")
-        self.inside("sh", "-c", "apt-get install --yes --no-install-recommends /packages/tubule_*.deb /packages/libtubule0*.deb /packages/python3-tubule_*.deb python3-h5py python3-matplotlib libjs-three", timed=True)
+        self.inside("sh", "-c", "apt-get install --yes --no-install-recommends /packages/tubule_*.deb /packages/libtubule0*.deb /packages/python3-tubule_*.deb python3-h5py python3-matplotlib", timed=True)
         # matplotlib of Debian brings scipy, which brings a compiler: nobody may need it.
         self.inside("sh", "-c", "rm -f /usr/bin/*gcc* /usr/bin/*g++* /usr/bin/cc /usr/bin/c++ /usr/bin/cpp*")
         self.user(f"tubule run {CASE}", timed=True)

@@ -1,34 +1,39 @@
 """Writes one HTML page that shows a result of tubule in any browser, without a network. See `tubule view --help`."""
 
 import base64
+import itertools
 import json
 import os
 import re
+import shlex
 import sys
+from operator import attrgetter
 
 import matplotlib
 import numpy as np
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Normalize, to_hex
+from matplotlib.figure import Figure
 
-from . import command_line, scan
-from .labels import as_label, flatten
+from . import command_line, flow, raster, scan
+from .colours import Colours
+from .labels import as_label, flatten, symbol
+from .movie import colours_of
 from .raster import lattice
 from .results import BadInput, Surface, opened, read_result
+from .tubes import choose_columns
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-THREE = "/usr/share/javascript/three/three.min.js"
-LICENCE = "three.js (https://threejs.org), copyright three.js authors, MIT License"
 STEPS = 65535  # of 16-bit numbers
-SIGNED = {"u_n", "u_t", "u_theta"}  # 0 has the colour in the middle
+# Symbols, and words for those whose colours are not from print.
+SYMBOLS = {"H": "H", "K": "K", **flow.SYMBOLS, "p": "p", "energy_density": "f"}
 WORDS = {
-    "H": "mean curvature H",
-    "K": "Gaussian curvature K",
-    "u_n": "normal velocity, > 0: outward",
+    "u_n": "normal velocity u\u2099, > 0: outward",
     "u_t": "velocity along the profile",
     "u_theta": "azimuthal velocity",
-    "p": "pressure p",
     "energy_density": "energy density f(H, K)",
 }
-OUTLIERS = 0.5  # percent of the values at either end of the colour scale that may be beyond it
+OUTLIERS = 0.5  # percent of the energy densities at either end that may be beyond the colour scale
 
 
 def encoded(values, kind):
@@ -65,7 +70,8 @@ class Shape:
             self.cells, self.order = frame.cells, frame.order
         else:
             self.mesh, self.points, data = None, np.column_stack([frame.r, frame.z]), vars(frame)
-        self.fields = {name: data[name] for name in WORDS if data.get(name) is not None}
+        names = [name for name in data if name in SYMBOLS or name.startswith("mode_")]
+        self.fields = {name: data[name] for name in names if data[name] is not None}
         self.u = data.get("u")
 
 
@@ -73,21 +79,36 @@ def colour_table(name):
     return encoded(matplotlib.colormaps[name](np.linspace(0, 1, 256))[:, :3] * 255 + 0.5, "u1")
 
 
-def described_fields(shapes):
+def field_colours(name, values, result, printed):
+    """As `tubule plot` draws them: the scale of H, K and p is from the frames that it draws, others from all."""
+    if name in ("H", "K", "p"):
+        return colours_of(result, printed, name)
+    if name == "energy_density":
+        low, high = np.percentile(values, [OUTLIERS, 100 - OUTLIERS])
+        half = 0.0 if high > low else 0.5
+        return Colours("viridis", Normalize(low - half, high + half), "neither", WORDS[name])
+    largest = float(np.abs(values).max()) or 1.0
+    label = WORDS.get(name, f"normal displacement of mode {name.removeprefix('mode_')}")
+    return Colours(flow.VELOCITY, Normalize(-largest, largest), "neither", label)
+
+
+def described_fields(shapes, result, printed):
     """Fields that every shape has, with the ends of one colour scale for all times."""
-    out = []
-    for name, words in WORDS.items():
+    out, names = [], [*SYMBOLS, *sorted(shapes[0].fields.keys() - SYMBOLS)]
+    for name in names:
         if not all(name in shape.fields for shape in shapes):
             continue
         values = np.concatenate([shape.fields[name] for shape in shapes])
-        low, high = float(values.min()), float(values.max())
-        shown = np.percentile(values, [OUTLIERS, 100 - OUTLIERS])
-        if name in SIGNED:
-            shown = np.array([-1, 1]) * np.abs(shown).max()
-        if not shown[1] > shown[0]:
-            shown = shown[0] - 0.5, shown[0] + 0.5
-        out.append({"name": name, "words": words, "low": low, "high": high, "shown": [float(x) for x in shown],
-                    "colours": colour_table("RdBu_r" if name in SIGNED else "viridis")})
+        colours = field_colours(name, values, result, printed)
+        out.append({
+            "name": name,
+            "symbol": SYMBOLS.get(name, name.replace("_", " ")),
+            "words": colours.label,
+            "low": float(values.min()),
+            "high": float(values.max()),
+            "shown": [float(colours.norm.vmin), float(colours.norm.vmax)],
+            "colours": colour_table(colours.map),
+        })  # fmt: skip
     return out
 
 
@@ -113,58 +134,117 @@ def finite(values):
 
 
 def ending(about):
-    """How the run ended, in words."""
-    out = {key: str(about[key]) for key in ("stop", "stop_message", "advice", "warnings") if str(about.get(key, ""))}
+    """How the run ended, in words, and the list of its warnings."""
+    out = {key: str(about[key]) for key in ("stop", "stop_message", "advice") if str(about.get(key, ""))}
     if "estimated_error" in about:
         error = float(about["estimated_error"])
         out["estimated_error"] = f"{error:.2g} of E_ref" if error < 1 else "unknown"
-    return out
+    return out, [line for line in str(about.get("warnings", "")).split("\n") if line]
 
 
 def run_page(path):
     result = read_result(path)
-    shapes = [Shape(frame) for frame in sorted([*result.frames, *result.surfaces], key=lambda frame: frame.time)]
-    if not shapes:
+    frames = result.surfaces or result.frames
+    if not frames:
         raise BadInput(f"{path}: no shapes to show")
-    fields = described_fields(shapes)
+    columns = choose_columns([result], None, attrgetter("surfaces" if result.surfaces else "frames"))
+    shapes = [Shape(frame) for frame in frames]
+    fields = described_fields(shapes, result, [column.cells[0] for column in columns])
     along = "parameter" if result.is_equilibrium and "parameter" in result.series else "time"
     vary = result.case.get("equilibrium", {}).get("branch", {}).get("vary", along)
+    about, warnings = ending(result.about)
     return {
         "kind": "shapes",
         "title": result.title.replace(r"\$", "$"),
         "file": os.path.basename(path),
         "case": [f"{key} = {value}" for key, value in flatten(result.case).items()],
-        "about": ending(result.about),
+        "about": about,
+        "warnings": warnings,
         "along": along,
-        "along_words": vary if along == "parameter" else along,
+        "along_words": symbol(vary.split(".")[-1]).replace("_", " ") if along == "parameter" else along,
         "series": {name: finite(values) for name, values in result.series.items() if name != "wall_seconds"},
         "meanings": result.meanings,
+        "view": raster.View().axes.T.tolist(),
+        "light": raster.LIGHT.tolist(),
         "fields": fields,
         **packed_shapes(shapes, fields),
     }
 
 
+def drawn_lines(part):
+    """Lines and dots that `tubule plot` draws on a map, in coordinates of its axes, with the labels of its legend."""
+    panel = Figure().add_subplot()
+    handles = [(handle, to_hex(handle.get_color()), handle.get_linewidth())
+               for handle in scan.draw_map(part, "outcome", panel) if hasattr(handle, "get_color")]  # fmt: skip
+
+    def label(*look):
+        """Of equal ones, such as closed forms, the legend has the order in which they are drawn."""
+        found = next((handle for handle in handles if handle[1:] == look), None)
+        if found:
+            handles.remove(found)
+        return found[0].get_label() if found else ""
+
+    lines = []
+    for one in (c for c in panel.collections if not isinstance(c, QuadMesh) and not c.get_hatch()):
+        look = to_hex(one.get_edgecolor()[0]), float(one.get_linewidth()[0])
+        ways = [way.tolist() for path in one.get_paths() for way in path.to_polygons(closed_only=False)]
+        dashes = list(one.get_linestyle()[0][1] or [])
+        lines.append({"colour": look[0], "width": look[1], "dashes": dashes, "label": label(*look), "ways": ways})
+    dots = [{"label": label(to_hex(line.get_color()), line.get_linewidth()), "places": line.get_xydata().tolist()}
+            for line in panel.lines]  # fmt: skip
+    return {"lines": [line for line in lines if line["ways"]], "dots": dots}
+
+
+def numbers_of(part):
+    return [name for name, data in part.points.items() if data.shape == part.shape and data.dtype.kind in "fiu"]
+
+
+def packed_slice(found, cut):
+    """What a map of two axes, or curves over one, show where the others are cut."""
+    part = scan.Slice(found, cut)
+    hatches = ("vesiculated limit is lower", part.vesiculated), ("not reached", part.unreached)
+    out = {"hatches": {words: np.flatnonzero(where).tolist() for words, where in hatches if where.any()},
+           "equal": [[float(value), lowest] for *_, value, _, lowest in part.equal]}  # fmt: skip
+    if part.all_starts:  # the numbers are those of the initial shapes
+        places = found.places(cut)
+        index = tuple(places.get(i, 0 if i == found.starts else slice(None)) for i in range(len(found.axes)))
+        out["starts"] = found.best_starts()[index].ravel().tolist()
+    else:
+        texts = part.points.get("message", np.zeros(0)).ravel()  # older scans have none
+        out["points"] = {name: finite(part.points[name].astype(float).ravel()) for name in numbers_of(part)}
+        out["messages"] = {k: text.decode(errors="replace") for k, text in enumerate(texts) if text}
+    return part, out | (drawn_lines(part) if len(part.axes) == 2 else {"lines": [], "dots": []})
+
+
 def scan_page(path):
     found = scan.Scan(path)
-    axes, points, names, title = found.axes, found.points, found.names, found.title
-    if len(axes) > 2:
-        raise BadInput(f"{path}: a scan of {len(axes)} axes has no map; view one of two axes")
     with opened(path) as file:
         case = os.path.basename(str(file["scan"].attrs["path"]))
         sets = [str(text) for text in file["case"].attrs.get("set", [])] if "case" in file else []
         stops = list(file["points/stop"].attrs["names"])
-    numbers = {name: data for name, data in points.items() if data.ndim == len(axes) and data.dtype.kind in "fiu"}
+    own = [i for i in range(len(found.axes)) if i != found.starts]
+    chosen = [i for i in range(len(found.axes)) if i == found.starts or i in own[2:]]
+    options = [[*([""] if i == found.starts else []), *found.axes[i].texts] for i in chosen]  # "": that of least energy
+    slices = {}
+    for picks in itertools.product(*(range(len(texts)) for texts in options)):
+        texts = [(found.axes[i].key, options[n][pick]) for n, (i, pick) in enumerate(zip(chosen, picks))]
+        part, slices[",".join(map(str, picks))] = packed_slice(found, [f"{key}={text}" for key, text in texts if text])
     return {
         "kind": "scan",
-        "title": as_label(title).replace(r"\$", "$") or os.path.basename(path),
+        "title": as_label(found.title).replace(r"\$", "$") or os.path.basename(path),
         "file": os.path.basename(path),
-        "command": ["tubule run " + case, *(f"--set {text}" for text in sets)],
-        "axes": [{"key": axis.key, "label": axis.label, "texts": axis.texts} for axis in axes],
-        "names": {"outcome": names, "stop": stops},
-        "outcome_colours": [scan.COLOURS.get(name, "#ffffff") for name in names],
+        "command": ["tubule run " + shlex.quote(case), *(f"--set {shlex.quote(text)}" for text in sets)],
+        "axes": [{"key": axis.key, "label": axis.label, "texts": axis.texts, "values": axis.values.tolist(),
+                  "borders": axis.borders().tolist(), "logarithmic": axis.logarithmic,
+                  "numeric": bool(axis.is_numeric)} for axis in part.axes],
+        "choices": [{"key": found.axes[i].key, "label": found.axes[i].label, "texts": texts,
+                     "starts": bool(i == found.starts)} for i, texts in zip(chosen, options)],
+        "names": {"outcome": found.names, "stop": stops},
+        "quantities": {name: scan.QUANTITIES.get(name, name) for name in numbers_of(part)},
+        "outcome_colours": [scan.COLOURS.get(name, "#ffffff") for name in found.names],
         "colours": colour_table("viridis"),
-        "points": {name: finite(data.astype(float).ravel()) for name, data in numbers.items()},
-    }
+        "slices": slices,
+    }  # fmt: skip
 
 
 def page_of(data):
@@ -172,17 +252,13 @@ def page_of(data):
         with open(os.path.join(HERE, name), encoding="utf-8") as file:
             return file.read()
 
-    try:
-        with open(THREE, encoding="utf-8") as file:
-            three = file.read() if data["kind"] == "shapes" else ""
-    except OSError:
-        raise command_line.Unavailable(f"tubule view needs {THREE}; install the package libjs-three") from None
     try:  # without "<", no words of the data end their element or change how the rest of the page is read
         script = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     except ValueError:
         raise BadInput(f"{data['file']}: contains numbers that are not finite") from None
-    parts = {"TITLE": data["title"].replace("&", "&amp;").replace("<", "&lt;"), "LICENCE": LICENCE if three else "",
-             "THREE": three, "SCRIPT": text("view.js"), "DATA": script}  # fmt: skip
+    scripts = ["view.js", *(["view_body.js"] if data["kind"] == "shapes" else []), f"view_{data['kind']}.js"]
+    title = data["title"].replace("&", "&amp;").replace("<", "&lt;")
+    parts = {"TITLE": title, "SCRIPT": "\n".join(map(text, scripts)), "DATA": script}
     # In one pass: what is put in may have such places itself.
     return re.sub(f"@({'|'.join(parts)})@", lambda place: parts[place[1]], text("view.html"))
 
