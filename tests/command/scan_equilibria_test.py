@@ -134,7 +134,7 @@ class Found(EquilibriaTest):
                 with h5py.File(self.folder / f"{name}.hdf") as file:
                     values = file[f"thresholds/{name}/values"][()]
                 self.assertAlmostEqual(abs(values[0, 0]), 0.01, delta=1e-9)
-                self.assertAlmostEqual(values[0, 0], -values[0, 1], delta=1e-9)
+                self.assertAlmostEqual(values[0, 0], -values[0, -1], delta=1e-9)
 
     @study
     def test_along_a_line_only(self):

@@ -67,7 +67,7 @@ class Calls:
             (tubule.scan, dict(case=TUBE, over={"energy.k42": [0, 0.1]}, boundary=None, output="scan.hdf", overwrite=False, jobs=1, to_the_end=False)),
             (tubule.read, dict(file="missing.hdf")),
             (tubule.draw, dict(what=self.result, output=None, kind="energy", times=[0.0], colour=["H"], labels=["a"], plane=("z", 0.0), scale="run",
-                               series=(), x="time", logy=False, quantity="", slices=(), dpi=100)),  # fmt: skip
+                               series=(), x="time", logx=False, logy=False, quantity="", slices=(), camera=(0, 90), width=3.4, dpi=100)),  # fmt: skip
             (self.result.frames.__getitem__, dict(number=0)),
             (self.result.series.__getitem__, dict(name="energy")),
             (frame.profile, dict(points=5)),

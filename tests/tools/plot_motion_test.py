@@ -195,13 +195,14 @@ class Pages(InFolder):
     def test_of_moving_surfaces(self):
         file = write(self.folder / "a.hdf")
         others = [write(self.folder / f"{k}.hdf", sets=[f"energy.k42={k}"]) for k in (0, 1)]
-        bars = ("mean curvature H = \u03ba\u2081 + \u03ba\u2082", "Gaussian curvature K", "pressure p, white: its mean 5")
+        bars = ("mean curvature H = \u03ba\u2081 + \u03ba\u2082", "Gaussian curvature K", "pressure p, white: mean \u2248 5")
         for arguments, words, never in (
-            ([file], ("(d)", "at rest", "|u\u2099| \u2264 2", "|u\u209c| \u2264 3", "|u\u209c| \u2264 6", "cut z = 0", "t\u2082 = 2",
+            ((file, "--colour", "u_n"), ("(d)", "at rest", "|u\u2099| \u2264 2", "|u\u209c| \u2264 3", "|u\u209c| \u2264 6", "cut z = 0", "t\u2082 = 2",
                       "what dissipation is", "what identity_defect is", "what kinetic_energy is", "normal velocity..."),
              ("what energy_error is", "curvature")),  # all of the error is zero
             ((file, "--kind", "surface", "--colour", "H,K,p", "--times", "0,2"), (*bars, "t\u2081 = 2"), ("velocity", "|u")),
-            ((file, "--kind", "surface", "--times", "1"), ["t\u2080 = 1", "normal velocity u\u2099 / max |u\u2099| of the run..."], []),
+            ((file, "--kind", "surface", "--times", "1", "--camera", "0,90"), ["t\u2080 = 1", "mean curvature..."], ["normal velocity"]),
+            ((file, "--kind", "surface", "--times", "1", "--colour", "u_n"), ["t\u2080 = 1", "normal velocity u\u2099 / max |u\u2099| of the run..."], []),
             ((file, "--kind", "surface", "--colour", "u_n", "--times", "1", "--scale", "shape"),
              ["normal velocity u\u2099 / max |u\u2099| of the shape..."], []),
             ((file, "--kind", "balance"), ["what dissipation is"], ["(a)"]),
@@ -223,7 +224,7 @@ class Pages(InFolder):
     def test_refusals(self):
         file = write(self.folder / "a.hdf", pressure=False)
         self.refused("not all of its frames have p", file, "--colour", "p")
-        self.refused("'T' is not one of u_n, H, K, p, mode_1, ...", file, "--colour", "H,T")
+        self.refused("'T' is not one of H, K, u_n, p, H0, energy_density, mode_1, ...", file, "--colour", "H,T")
         self.refused("--plane: z = 2 meets none of the surfaces", file, "--plane", "z=2")
         for plane in ("w=0", "z=", "z=e", "z=nan", "z"):
             self.refused(f"'{plane}' is not x, y or z = number", file, "--plane", plane)
@@ -282,8 +283,8 @@ end = 0.01
         case.write_text(self.CASE)
         subprocess.run([TUBULE, "run", case, "--quiet", "-o", file], check=True)
         texts = self.drawn(file, "--plane", "x=-0.25", "--colour", "p,H", "--times", "0.01", program=TUBULE)
-        self.check_words(texts, "cut x = \u22120.25", "mean curvature H = \u03ba\u2081 + \u03ba\u2082",
-                         "pressure p, white: its mean...")  # fmt: skip
+        self.check_words(texts, "cut x = \u22120.25", "mean curvature H = \u03ba\u2081 + \u03ba\u2082...",
+                         "pressure p, white: mean...")  # fmt: skip
         self.refused("is not x, y or z = number", file, "--plane=w=0", program=TUBULE)
         self.refused("--colour", file, "--colour=H,T", program=TUBULE)
 

@@ -30,7 +30,7 @@ PLOT = PACKAGE / "drawing"
 sys.path[:0] = [str(PACKAGE), str(Path(__file__).resolve().parents[1] / "support")]
 import scripts  # noqa: E402
 import drawing  # noqa: E402
-from drawing import colours, curves, energy, labels, movie, results, tubes  # noqa: E402
+from drawing import colours, command_line, curves, energy, labels, movie, results, tubes  # noqa: E402
 
 FIGURES = Path(__file__).resolve().parents[2] / "docs/figures"
 drawing.__path__.append(str(FIGURES))
@@ -202,6 +202,10 @@ class Labels(unittest.TestCase):
     def test_formulas_and_numbers(self):
         self.assertEqual(labels.formula("k_{20}(H-H_0)^2"), "k\u2082\u2080(H\u2212H\u2080)\u00b2")
         self.assertEqual(labels.formula("E_{42}"), "E\u2084\u2082")
+        self.assertEqual(labels.formula("\\sigma"), "\u03c3")
+        cases = [tomllib.loads(CASE.format(k42=k42)) for k42 in (0.2, 0, 0.06)]
+        self.assertEqual(labels.sorted_by_value(cases), [1, 2, 0])
+        self.assertEqual(labels.sorted_by_value([{"a": "y"}, {"a": "x"}]), [0, 1])
         self.assertEqual(labels.formula("k_g|\\nabla H|^2"), "kg|\u2207H|\u00b2")
         found = [labels.power(value, 2) for value in (0, 0.0123, 4567, 4.26e-5, -1.5e7)]
         self.assertEqual(found, ["0", "0.012", "4600", "4.3\u00b710\u207b\u2075", "\u22121.5\u00b710\u2077"])
@@ -217,9 +221,11 @@ class Columns(InFolder):
 
     def test_times(self):
         for options, wanted, expected in (
-            ([{"times": [float(i) for i in range(31)]}], None, [0, 6, 12, 18, 24, 30]),  # six at most, first and last kept
+            # Six at most, first and last kept, those between which the energy 3 + exp(-6 t) changes, then evenly.
+            ([{"times": [float(i) for i in range(31)]}], None, [0, 1, 8, 15, 22, 30]),
             ([{"times": [0, 1, 2, 3]}, {"times": [0, 1.5, 2, 3]}], None, [0, 2, 3]),  # shared times go first
             ([{"times": [0, 1, 2, 3]}], [2, 0], [0, 2]),
+            ([{"times": [0, 1, 2, 3]}, {"times": [0, 1, 4]}], [0, np.inf], [0, None]),  # the last ones, each at its time
         ):
             self.assertEqual(self.columns(*options, times=wanted)[0], expected)
         with self.assertRaisesRegex(results.BadInput, "no result has a frame at t = 1.5; there are .* 0, 1, 2, 3"):
@@ -245,6 +251,14 @@ class Scales(unittest.TestCase):
         self.assertAlmostEqual(norm.vmax, colours.MARGIN * colours.COVERED, delta=0.01)  # 98 % of a uniform spread
         self.assertEqual((norm.vmin, extend), (-norm.vmax, "min"))
 
+    def test_white_is_the_mean_where_all_is_far_from_the_centre(self):
+        values, area = [np.linspace(-1.4, -0.8, 1001)], [np.ones(1001)]
+        self.assertTrue(colours.is_far(0.0, values, area))
+        self.assertFalse(colours.is_far(-1.0, values, area))
+        (norm, extend), words = colours.about_mean(values, area)
+        self.assertAlmostEqual(norm(-1.1), 0.5)
+        self.assertEqual((norm(-1.4) > 0, norm(-0.8) < 1, extend, words), (True, True, "neither", ", white: mean \u2248 \u22121.1"))
+
     def test_rounding_is_no_colour(self):
         norm, extend = colours.colour_scale([np.array([1e-14, -1e-14])], [np.ones(2)], 0.0)
         self.assertEqual((norm.vmin, norm.vmax, extend), (-1, 1, "neither"))
@@ -262,8 +276,9 @@ class Scales(unittest.TestCase):
 
 class Pictures(InFolder):
     def test_three_results_labelled_by_what_differs(self):
-        files = [self.write(f"{i}.hdf", k42=k42) for i, k42 in enumerate((0, 0.06, 0.12))]
+        files = [self.write(f"{i}.hdf", k42=k42) for i, k42 in enumerate((0.12, 0, 0.06))]
         texts = self.drawn(*files)
+        self.assertEqual([text for text in texts if "k\u2084\u2082 =" in text], 2 * [f"k\u2084\u2082 = {k}" for k in ("0", "0.06", "0.12")])
         for words in ("k\u2084\u2082 = 0", "k\u2084\u2082 = 0.06", "k\u2084\u2082 = 0.12"):
             self.assertEqual(texts.count(words), 2, words)  # beside its row and in the legend
         # A term that is zero everywhere has no line.
@@ -278,6 +293,7 @@ class Pictures(InFolder):
         file, other = self.write(), self.write("b.hdf", k42=0.06)
         stopped = self.write("c.hdf", k42=1, times=[0, 0.01, 0.03], stop="pinch-off")
         varying = self.write("d.hdf", sets=['energy.H0="-2 + 0.1*cos(pi*z)"'], amplitude=0.0)
+        domains = self.write("f.hdf", profile=lambda t: tube(t, 0.2) | {"H0": np.linspace(-3, -1, 65)})
         large = self.write("e.hdf")
         with h5py.File(large, "a") as f:
             f["series/energy"][:] = 37.69923 + 1e-5 * f["series/time"][:]
@@ -291,7 +307,9 @@ class Pictures(InFolder):
             # In the legend; below its last tube, which stands in the column of t = 0.05, and so has its own time.
             ((file, stopped), ["pinch-off at t = 0.03", "pinch-off", "t = 0.03"], []),
             # No value of H0 is white, so the scale is about the mean curvature: -1 on the straight tube of radius 1.
-            ((varying, "--kind", "profiles"), ["mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves), white: mean \u2248 \u22121"], []),
+            ((varying, "--kind", "profiles"), ["mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves)", "white: mean \u2248 \u22121"], []),
+            ((domains, "--kind", "profiles,energy", "--colour", "H0,K", "--logx", "--from=0.1"),
+             ["spontaneous curvature H\u2080 (left halves)", "time t", "bending energy E"], ["mean curvature"]),
             # Small changes of a large energy are ticks from a round number: 37.69923 is 3.
             ((large, "--kind", "energy"), ["(bending energy E \u2212 37.6992) / 10\u207b\u2075", "3"], []),
         ):  # fmt: skip
@@ -302,6 +320,8 @@ class Pictures(InFolder):
         done = self.plot(self.write("one.hdf"))
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(png_size(self.folder / "one.png")[0], 2100)
+        self.assertEqual(self.plot(self.folder / "one.hdf", "--width=3.4", "--dpi=100").returncode, 0)
+        self.assertEqual(png_size(self.folder / "one.png")[0], 340)
         self.assertIn("A made-up tube", svg_texts(self.folder / "one.svg"))
 
     def test_files(self):
@@ -376,7 +396,8 @@ class Curves(InFolder):
             ({"profile": moving}, ["mean curvature..."], []),  # a graph
         ):  # fmt: skip
             with self.subTest(options=options):
-                self.check_words(self.drawn(self.write(**options)), *words, never=never)
+                colour = ["--colour=u_n"] * any(word.startswith(("|u", "normal")) for word in words)
+                self.check_words(self.drawn(self.write(**options), *colour), *words, never=never)
 
     def test_equilibria_have_numbers_and_curvatures(self):
         def at_rest(time):
@@ -387,8 +408,10 @@ class Curves(InFolder):
         with h5py.File(file, "a") as f:
             for number, frame in enumerate(f["frames"].values()):
                 frame.attrs["parameter"] = 0.9 - 0.1 * number
-        bar = "mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves), white: H\u2080 = \u22122"
-        self.check_words(self.drawn(file), bar, "shape 2", "number of the shape", "= 0.7", never=["t\u2081"])
+            f["series/parameter"] = [0.9, 0.8, 0.7]
+            f["series"].attrs["order"] = np.array([*f["series"].attrs["order"], "parameter"], dtype=h5py.string_dtype())
+        bar = "mean curvature H = \u03ba\u2081 + \u03ba\u2082 (left halves)"
+        self.check_words(self.drawn(file), bar, "shape 2", "reduced volume", "= 0.7", "bending energy E", never=["t\u2081", "number of the"])
         single = self.write("b.hdf", profile=at_rest, sets=["equilibrium.area=1"], times=[0], rows=1)
         self.check_words(self.drawn(single), never=["bending energy E"])
 
@@ -464,7 +487,7 @@ class Films(InFolder):
     def test_refusals(self):
         one, two = write(self.folder / "one.hdf", times=(0,)), write(self.folder / "two.hdf")
         self.refused("a film needs two or more", one, "--movie", self.folder / "a.gif")
-        self.refused("--movie goes with --times, --label, --fps and one --colour only", two, "--movie", self.folder / "a.gif", "--dpi=100")
+        self.refused("--movie goes with --times, --label, --fps, --camera and one --colour only", two, "--movie", self.folder / "a.gif", "--dpi=100")
         self.refused("one of .mp4, .gif", two, "--movie", self.folder / "a.avi")
         self.refused("does not exist", two, "--movie", self.folder / "no/a.gif")
         self.refused("shows one result", one, two, "--movie", self.folder / "a.gif")
@@ -522,7 +545,7 @@ class Refusals(InFolder):
 
     def test_titles_that_no_picture_holds(self):
         path = replaced(self.write(), resolved_case=CASE.format(k42=0).replace("A made-up tube", "x" * 200000))
-        self.check_words(self.drawn(path), "x" * 197 + "...")
+        self.check_words(self.drawn(path), "x" * 97, "xxx...")
 
     @unittest.skipUnless(sys.argv[1:], "needs the program")
     def test_interrupts_while_libraries_are_imported(self):
@@ -543,20 +566,26 @@ class Refusals(InFolder):
             ("no profiles to draw", self.write("b.hdf", times=[]), "--kind", "profiles"),
             ("no energy series to draw", self.write("c.hdf", rows=0), "--kind", "energy"),
             ("neither frames nor an energy series", empty),
-            ("is not a list of numbers", file, "--times", "0,x"),
             ("has no series r_mni; it has energy", file, "--series", "r_mni"),
             ("time; did you mean energy_40 or", file, "--series", "enrgy_40"),
             ("no row has a time in the range; it goes from 0 to 1", file, "--series", "energy", "--from", "2"),
             ("energy_40 is nowhere positive in the range, as --logy needs it", file, "--series=energy_40", "--logy"),
-            ("--x, --from, --to and --logy belong to --series", file, "--logy"),
+            ("time is nowhere positive in the range, as --logx needs it", file, "--series=energy", "--logx", "--to=0"),
+            ("not all of its frames have H0, which those have where it varies", file, "--colour=H0"),
             ("is no scan, to which --confirmed belongs", file, "--confirmed", "points.json"),
             ("no result has a frame at t = 0.3; there are frames at 0, 0.01", file, "--times", "0.3"),
-            ("--dpi: 20 is not between 30 and 1200", file, "--dpi=20"),
             ("x.jpg: a picture is written as one of .png, .svg, .pdf", file, "-o", self.folder / "x.jpg"),
             ("does not exist", file, "-o", self.folder / "none/x.png"),
             ("taken.png: cannot be written", file, "-o", self.folder / "taken.png"),
         ):
             self.refused(words, *arguments)
+
+    def test_values_of_options(self):
+        for words, option in (("is not a list of numbers", "--times=0,x"), ("--x and --logy belong to --series", "--logy"),
+                              ("--dpi: 20 is not between 30 and 1200", "--dpi=20"), ("is not AZIMUTH,ELEVATION in degrees", "--camera=1,100"),
+                              ("--width: 2 is not between 3 and 20", "--width=2")):  # fmt: skip
+            with self.assertRaisesRegex(results.BadInput, words):
+                command_line.plot_options(["a.hdf", option])
 
     def test_missing_library_names_its_package(self):
         # A module of that name that cannot be imported, found before Debian's.

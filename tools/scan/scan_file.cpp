@@ -175,8 +175,8 @@ std::map<std::size_t, PointResult> get_crossings_of_energy(hid_t file) {
 void put_threshold(hid_t parent, const ThresholdMap& map) {
     const auto group = make_group(parent, map.name);
     put_attribute(group, "label", map.label);
-    put_dataset(group, "first", {map.first.begin(), map.first.end()});
-    put_dataset(group, "second", {map.second.begin(), map.second.end()});
+    put_dataset(group, "first", H5T_NATIVE_DOUBLE, space({map.first.size()}), map.first.data());
+    put_dataset(group, "second", H5T_NATIVE_DOUBLE, space({map.second.size()}), map.second.data());
     put_dataset(group, "values", H5T_NATIVE_DOUBLE, space({map.first.size(), map.second.size()}), map.values.data());
 }
 

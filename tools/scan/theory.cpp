@@ -1,6 +1,9 @@
 #include "tools/scan/theory.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -13,7 +16,8 @@
 namespace tubule {
 namespace {
 
-constexpr std::size_t most_nodes = 41;  // along an axis: a line needs fewer than a map
+constexpr std::size_t most_nodes = 41;   // along an axis where lines are looked for: fewer than a map has
+constexpr std::size_t fine_enough = 65;  // where they are drawn
 
 // How many cells an initial shape with modes (n, 0) alone repeats in its length. Tier 1
 // keeps that symmetry.
@@ -142,11 +146,110 @@ std::optional<double> sphere_in_sphere(const Problem& c) {
     return spheres_with_neck(c, 1);
 }
 
-std::vector<std::size_t> some_of(std::size_t size) {
-    std::vector<std::size_t> places;
-    const std::size_t n = std::min(size, most_nodes);
-    for (std::size_t i = 0; i < n; ++i) places.push_back(n > 1 ? i * (size - 1) / (n - 1) : 0);
-    return places;
+// Every value of a short axis, some of a long one.
+Axis some_of(const Axis& axis) {
+    Axis some = axis;
+    const std::size_t n = std::min(axis.size(), most_nodes);
+    some.values.resize(n);
+    for (std::size_t i = 0; n > 1 && i < n; ++i) some.values[i] = axis.values[i * (axis.size() - 1) / (n - 1)];
+    return some;
+}
+
+// With a value between every two neighbours, unless it is fine enough.
+Axis halved(const Axis& axis) {
+    if (axis.size() >= fine_enough) return axis;
+    Axis fine = axis;
+    fine.values.clear();
+    for (std::size_t i = 0; i < axis.size(); ++i) {
+        if (i > 0) fine.values.push_back({fmt::format("{}", axis.value(i - 1, 0.5))});
+        fine.values.push_back(axis.values[i]);
+    }
+    return fine;
+}
+
+// A grid of two axes of numbers, and thresholds on it.
+struct Grid {
+    Scan scan;
+    std::array<std::size_t, 2> axes;
+    std::vector<const Threshold*> kinds;
+    std::vector<std::vector<double>> values{};  // of each threshold, row by row
+
+    std::size_t size(std::size_t side) const { return scan.axes[axes[side]].size(); }
+
+    // Of all thresholds at a node; NaN where one does not apply or there is no case.
+    std::vector<double> exact(const Nodes& nodes, std::size_t node) const {
+        std::vector<double> found(kinds.size(), std::numeric_limits<double>::quiet_NaN());
+        try {
+            const Problem c = scan.case_of(nodes.point_of(node, 0));
+            for (std::size_t k = 0; k < kinds.size(); ++k) found[k] = kinds[k]->value(c).value_or(found[k]);
+        } catch (const CaseError&) {  // no case, no line
+        }
+        return found;
+    }
+};
+
+int sign(double value) {
+    return std::isnan(value) ? 2 : (value > 0) - (value < 0);
+}
+
+// Values on a grid with halved axes: exact in and beside cells through which a line passes, elsewhere means.
+Grid refined(const Grid& coarse) {
+    Grid fine = coarse;
+    std::array<std::size_t, 2> n{}, m{}, step{};
+    for (const std::size_t side : {0, 1}) {
+        Axis& axis = fine.scan.axes[fine.axes[side]];
+        axis = halved(axis);
+        n[side] = coarse.size(side), m[side] = axis.size(), step[side] = m[side] > n[side] ? 2 : 1;
+    }
+    for (auto& values : fine.values) values.assign(m[0] * m[1], 0);
+    const Nodes nodes(fine.scan);
+    for (std::size_t node = 0; node < m[0] * m[1]; ++node) {
+        std::array<std::size_t, 2> low{}, high{}, from{}, to{};  // coarse nodes around, and beside these
+        for (const std::size_t side : {0, 1}) {
+            const std::size_t at = side == 0 ? node / m[1] : node % m[1];
+            low[side] = at / step[side], high[side] = (at + step[side] - 1) / step[side];
+            from[side] = low[side] - std::min<std::size_t>(low[side], 1);
+            to[side] = std::min(high[side] + 1, n[side] - 1);
+        }
+        const bool known = low == high;
+        bool crossed = false;
+        for (const auto& values : coarse.values)
+            for (std::size_t i = from[0]; i <= to[0]; ++i)
+                for (std::size_t j = from[1]; j <= to[1]; ++j)
+                    crossed |= sign(values[i * n[1] + j]) != sign(values[from[0] * n[1] + from[1]]);
+        const auto exact = crossed && !known ? fine.exact(nodes, node) : std::vector<double>();
+        for (std::size_t k = 0; k < fine.values.size(); ++k) {
+            const auto value = [&](std::size_t i, std::size_t j) { return coarse.values[k][i * n[1] + j]; };
+            fine.values[k][node] = !exact.empty() ? exact[k]
+                                                  : (value(low[0], low[1]) + value(low[0], high[1]) +
+                                                     value(high[0], low[1]) + value(high[0], high[1])) /
+                                                        4;
+        }
+    }
+    return fine;
+}
+
+// Values of an axis, or places where they are no numbers.
+std::vector<double> numbers_of(const Axis& axis) {
+    std::vector<double> numbers;
+    for (const auto& value : axis.values)
+        numbers.push_back(number_of(value[0]).value_or(static_cast<double>(numbers.size())));
+    return numbers;
+}
+
+// Whether there is a case between its first two values, both numbers.
+bool divisible(const Scan& scan, std::size_t axis) {
+    Scan between = scan;
+    for (const auto& value : scan.axes[axis].values)
+        if (!number_of(value[0])) return false;
+    if (scan.axes[axis].size() < 2) return false;
+    between.axes[axis].values = {{fmt::format("{}", scan.axes[axis].value(0, 0.5))}};
+    try {
+        between.case_of(0);
+        return true;
+    } catch (const CaseError&) {  // as between whole numbers
+        return false;
+    }
 }
 
 }  // namespace
@@ -164,29 +267,37 @@ const std::vector<Threshold>& thresholds() {
 }
 
 std::vector<ThresholdMap> threshold_maps(const Scan& scan) {
-    const Nodes nodes(scan);
-    std::vector<Axis> axes;  // that of starts changes no threshold
-    for (std::size_t a = 0; a < scan.axes.size(); ++a)
-        if (!nodes.has_starts() || a != start_axis(scan)) axes.push_back(scan.axes[a]);
-    if (axes.size() != 2 || axes[0].keys.size() != 1 || axes[1].keys.size() != 1) return {};
+    std::vector<std::size_t> axes;  // that of starts changes no threshold
+    {
+        const Nodes nodes(scan);
+        for (std::size_t a = 0; a < scan.axes.size(); ++a)
+            if (!nodes.has_starts() || a != start_axis(scan)) axes.push_back(a);
+    }
+    if (axes.size() != 2 || scan.axes[axes[0]].keys.size() != 1 || scan.axes[axes[1]].keys.size() != 1) return {};
+    Grid grid{scan, {axes[0], axes[1]}, {}};
+    for (const std::size_t a : axes) grid.scan.axes[a] = some_of(scan.axes[a]);
+    for (const Threshold& threshold : thresholds()) grid.kinds.push_back(&threshold);
+    grid.values.resize(grid.kinds.size());
+    const Nodes nodes(grid.scan);
+    for (std::size_t node = 0; node < grid.size(0) * grid.size(1); ++node) {
+        const auto found = grid.exact(nodes, node);
+        for (std::size_t k = 0; k < found.size(); ++k) grid.values[k].push_back(found[k]);
+    }
+    for (std::size_t k = grid.kinds.size(); k-- > 0;) {
+        const auto has = [&](int wanted) {
+            return std::any_of(grid.values[k].begin(), grid.values[k].end(),
+                               [&](double v) { return sign(v) == wanted; });
+        };
+        if (has(1) && has(-1)) continue;
+        grid.kinds.erase(grid.kinds.begin() + static_cast<std::ptrdiff_t>(k));
+        grid.values.erase(grid.values.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    const bool fine = !grid.kinds.empty() && divisible(grid.scan, axes[0]) && divisible(grid.scan, axes[1]);
+    while (fine && std::min(grid.size(0), grid.size(1)) < fine_enough) grid = refined(grid);
     std::vector<ThresholdMap> maps;
-    for (const Threshold& threshold : thresholds())
-        maps.push_back({threshold.name, threshold.label, some_of(axes[0].size()), some_of(axes[1].size()), {}});
-    for (const std::size_t i : maps.front().first)
-        for (const std::size_t j : maps.front().second) {
-            std::optional<Problem> c;
-            try {
-                c = scan.case_of(nodes.point_of(i * axes[1].size() + j, 0));
-            } catch (const CaseError&) {  // no case, no line
-            }
-            for (std::size_t k = 0; k < maps.size(); ++k)
-                maps[k].values.push_back(
-                    (c ? thresholds()[k].value(*c) : std::nullopt).value_or(std::numeric_limits<double>::quiet_NaN()));
-        }
-    std::erase_if(maps, [](const ThresholdMap& map) {
-        const auto crosses = [&](auto sign) { return std::any_of(map.values.begin(), map.values.end(), sign); };
-        return !crosses([](double v) { return v > 0; }) || !crosses([](double v) { return v < 0; });
-    });
+    for (std::size_t k = 0; k < grid.kinds.size(); ++k)
+        maps.push_back({grid.kinds[k]->name, grid.kinds[k]->label, numbers_of(grid.scan.axes[axes[0]]),
+                        numbers_of(grid.scan.axes[axes[1]]), grid.values[k]});
     return maps;
 }
 

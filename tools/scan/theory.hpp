@@ -19,11 +19,11 @@ struct Threshold {
 // All that are known: to add one, see theory.cpp.
 const std::vector<Threshold>& thresholds();
 
-// A threshold on part of the grid's nodes: rows along the first axis, columns along the second.
+// A threshold on a grid finer than that of the points: rows along the first axis, columns along the second.
 struct ThresholdMap {
     std::string name, label;
-    std::vector<std::size_t> first, second;  // places on the axes
-    std::vector<double> values;              // row by row; NaN where it does not apply
+    std::vector<double> first, second;  // values of the axes
+    std::vector<double> values;         // row by row, exact beside the line; NaN where it does not apply
 };
 
 // For a grid with two axes of numbers, besides one of initial shapes: those that change their sign on it.

@@ -14,18 +14,20 @@ from .results import Result, read
 
 def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = None, *, kind: str = "all",
          times: Iterable[float] = (), colour: Iterable[str] = (), labels: Iterable[str] = (), plane: tuple[str, float] = ("z", 0.0),
-         scale: str = "run", series: Iterable[str] = (), x: str = "time", logy: bool = False, quantity: str = "",
-         slices: Iterable[str] = (), dpi: float = 300):  # fmt: skip
+         scale: str = "run", series: Iterable[str] = (), x: str = "time", logx: bool = False, logy: bool = False,
+         quantity: str = "", slices: Iterable[str] = (), camera: tuple[float, float] = (-37.0, 22.0), width: float = 7.0, dpi: float = 300):  # fmt: skip
     """The picture that `tubule plot` makes, as a matplotlib.figure.Figure. Needs the packages matplotlib and h5py.
 
     what      a Result, several ones (labelled by what differs in their cases), or names of result files; a Scan that
               was run with an output, or the name of its file
     output    also writes it: .png, .svg or .pdf, or several of them
-    kind      "profiles", "surface", "cuts", "energy", "balance", "all"
-    times     of the frames to show
-    colour    of surfaces: "u_n", "H", "K", "p"
+    kind      "profiles", "surface", "cuts", "energy", "balance", "all", or several as in "surface,energy"
+    times     of the frames to show; infinity stands for the last one
+    colour    of shapes: "H", "K", "u_n", "p", "H0", "energy_density"
     series    draws these series against the series x, and nothing else
     quantity, slices    of a scan: what its map shows; KEY=VALUE of axes that are cut
+    camera    azimuth and elevation in degrees
+    width     inches of the page, 3 to 20
     dpi       pixels per inch, 30 to 1200
     The others are as the options of `tubule plot`. Raises ValueError for what cannot be drawn.
 
@@ -40,11 +42,12 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
 
     outputs = [file_name(path) for path in ([output] if isinstance(output, (str, os.PathLike)) else output or [])]
     words = [f"--kind={kind}", f"--colour={','.join(colour)}", f"--scale={scale}", f"--plane={plane[0]}={float(plane[1])!r}", f"--x={x}",
-             f"--times={','.join(repr(float(time)) for time in times)}", f"--series={','.join(series)}", *(f"--label={label}" for label in labels)]  # fmt: skip
+             f"--camera={float(camera[0])!r},{float(camera[1])!r}", f"--width={float(width)!r}",
+             f"--times={','.join('end' if time == float('inf') else repr(float(time)) for time in times)}", f"--series={','.join(series)}", *(f"--label={label}" for label in labels)]  # fmt: skip
     try:
-        options = command_line.plot_options([*words, *["--logy"] * bool(logy), "result"])
+        options = command_line.plot_options([*words, *["--logx"] * bool(logx), *["--logy"] * bool(logy), "result"])
         style.check_outputs(outputs)
-        with matplotlib.rc_context(style.SETTINGS), style.resolution(dpi):
+        with matplotlib.rc_context(style.SETTINGS), style.page(dpi, options.width):
             file = _scan_file(what)
             if file is not None:
                 figure = scan.figure_of(file, quantity, list(slices))

@@ -1,4 +1,5 @@
-"""Colours of curvature: H orange to violet, K blue to red, white where H = H0 (if that varies: at the mean) and K = 0."""
+"""Colours of quantities: H orange to violet, K blue to red, white where H = H0 and K = 0, or at the mean where H0 varies or
+all values are far from it; velocities, pressure, H0 and the density of energy."""
 
 from dataclasses import dataclass
 
@@ -8,11 +9,26 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from .labels import number, power
+from . import style
+from .labels import formula, number, power
 
 COVERED = 0.98  # part of the membrane area whose curvature is inside the colour scale
 MARGIN = 1.25  # the colour scale extends beyond that by this factor
+WHOLE = 2.2  # and up to the last value if that is within this factor
+FAR = 0.5  # of the range of values: from there on white is their mean
+LONG = 50  # letters of a label above which it has two lines
+BAR_HEIGHT = 0.66  # inches of a colour bar with its label
 ROUNDING = 1e-9  # a uniform tube has K = 0 up to this; the colour scale must not magnify it
+MAPS = {"H": "PuOr", "K": "RdBu_r", "H0": "PuOr", "p": "PRGn"}
+SYMBOLS = {"u_n": "u\u2099", "H0": "H\u2080", "energy_density": "f"}
+LABELS = {
+    "H": "mean curvature H = \u03ba\u2081 + \u03ba\u2082",
+    "K": "Gaussian curvature K",
+    "H0": "spontaneous curvature H\u2080",
+    "p": "pressure p",
+    "energy_density": "bending energy per area f",
+    "u_n": "normal velocity u\u2099, > 0: outward",
+}
 
 
 @dataclass
@@ -33,6 +49,8 @@ def colour_scale(values, areas, centre):
     order = np.argsort(distance)
     covered = np.cumsum(area[order]) / area.sum()
     half = MARGIN * distance[order][min(np.searchsorted(covered, COVERED), distance.size - 1)]
+    if half < distance.max() <= WHOLE * half:
+        half = distance.max()
     if half < ROUNDING * max(1.0, abs(centre)):
         half = max(1.0, abs(centre))
     beyond_low = any((v < centre - half).any() for v in values)
@@ -41,29 +59,63 @@ def colour_scale(values, areas, centre):
     return Normalize(centre - half, centre + half), extend
 
 
-def curvature_colours(results, frames, areas):
-    """Colours of H and K on these frames; `areas` has the area of each of their values, one list per frame."""
-    common_H0 = {result.H0 for result in results}
-    centre, white = (common_H0.pop(), "H\u2080 = ") if len(common_H0) == 1 else (0.0, "")
-    if centre is None:
-        found = np.average(np.concatenate([frame.H.ravel() for frame in frames]), weights=np.concatenate(areas))
-        centre, white = float(f"{found:.2g}"), "mean \u2248 "
-    label = "mean curvature H = \u03ba\u2081 + \u03ba\u2082{}" + (f", white: {white}{number(centre)}" if centre else "")
-    H = Colours("PuOr", *colour_scale([frame.H.ravel() for frame in frames], areas, centre), label)
-    K = Colours("RdBu_r", *colour_scale([frame.K.ravel() for frame in frames], areas, 0.0), "Gaussian curvature K{}")
-    return H, K
+def covered_range(values, areas):
+    """Lowest and highest value, but for what nearly no area has."""
+    value, area = np.concatenate(values), np.concatenate(areas)
+    order = np.argsort(value)
+    part = np.cumsum(area[order]) / area.sum()
+    rest = (1 - COVERED) / 2
+    return value[order][min(np.searchsorted(part, rest), value.size - 1)], value[order][min(np.searchsorted(part, 1 - rest), value.size - 1)]
 
 
-def pressure_colours(values, areas):
-    mean = float(np.average(np.concatenate(values), weights=np.concatenate(areas)))
-    return Colours("PRGn", *colour_scale(values, areas, mean), f"pressure p, white: its mean {power(mean, 3)}")
+def is_far(centre, values, areas):
+    """Whether all values lie so far to one side of `centre` that a scale around it would show little of how they differ."""
+    low, high = covered_range(values, areas)
+    return max(low - centre, centre - high) > FAR * (high - low) > 0
 
 
-def draw_bars(figure, bottom, H, K, H_where="", K_where=""):
-    """Two colour bars in the 0.5 inches above `bottom`; the words say which part of the picture they are for."""
-    for left, colours, where in ((0.12, H, H_where), (0.56, K, K_where)):
-        mappable = ScalarMappable(colours.norm, colours.map)
-        draw_bar(figure, bottom, left, 0.34, mappable, colours.label.format(where), colours.extend)
+def about_mean(values, areas):
+    """A scale around the rounded mean, and words that say so."""
+    mean = np.average(np.concatenate(values), weights=np.concatenate(areas))
+    low, high = covered_range(values, areas)
+    digits = 2 if high == low else max(2, 1 + int(np.ceil(np.log10(max(abs(low), abs(high)) / (high - low)))))
+    centre = float(f"{mean:.{digits}g}")
+    return colour_scale(values, areas, centre), f", white: mean \u2248 {number(centre)}"
+
+
+def colours_of(name, results, shapes, areas):
+    """The colours of a quantity: one scale for all shapes; `areas` has the area of each of their values, a list per shape."""
+    values = [np.ravel(shape.quantity(name)) for shape in shapes]
+    if name == "u_n":
+        largest = max(float(np.abs(v).max()) for v in values) or 1.0
+        return Colours("RdBu_r", Normalize(-largest, largest), "neither", LABELS[name])
+    if name == "energy_density":
+        low, high = covered_range(values, areas)
+        low = min(0.0, low)
+        return Colours("magma_r", Normalize(low, max(MARGIN * high, low + 1e-9)), "max" if max(map(np.max, values)) > MARGIN * high else "neither", LABELS[name])
+    centre, words = 0.0, ""
+    if name == "H":
+        common = {result.H0 for result in results}
+        centre = common.pop() if len(common) == 1 else 0.0
+        words = f", white: {formula('H_0')} = {number(centre)}" if centre else ""
+    if name in ("H0", "p") or centre is None or (name in "HK" and is_far(centre, values, areas)):
+        scale, words = about_mean(values, areas)
+    else:
+        scale = colour_scale(values, areas, centre)
+    if scale[1] != "neither":  # a neck, say
+        words += f", from {power(min(map(np.min, values)), 2)} to {power(max(map(np.max, values)), 2)}"
+    return Colours(MAPS[name], *scale, LABELS[name] + words)
+
+
+def bars_height(count):
+    """Inches that so many colour bars need."""
+    return BAR_HEIGHT * (count if style.is_narrow() else 1)
+
+
+def draw_bars(figure, bottom, shown):
+    """Colour bars, for a list of colours and labels."""
+    for (left, width, line), (colours, label) in zip(style.slots(len(shown)), shown):
+        draw_bar(figure, bottom + line * BAR_HEIGHT, left, width, ScalarMappable(colours.norm, colours.map), label, colours.extend)
 
 
 def draw_bar(figure, bottom, left, width, mappable, label, extend="neither"):
@@ -72,7 +124,10 @@ def draw_bar(figure, bottom, left, width, mappable, label, extend="neither"):
     axes = figure.add_axes([left, (bottom + 0.38) / height, width, 0.09 / height])
     bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=extend)
     bar.outline.set_linewidth(0.5)
-    bar.set_label(label, labelpad=2)
+    if len(label) > LONG:
+        name, _, rest = label.partition(",")
+        label = f"{name}\n{rest.strip()}" if rest else label
+    bar.set_label(label, labelpad=2, fontsize=8 if "\n" not in label else 7)
     bar.ax.tick_params(width=0.5, length=2.5)
     bar.locator = MaxNLocator(5)
     bar.formatter = FuncFormatter(lambda value, _: number(value))

@@ -12,7 +12,7 @@ import textwrap
 EXIT_BAD_INPUT, EXIT_UNAVAILABLE, EXIT_INTERRUPTED = 2, 4, 130
 DEBIAN_PACKAGES = {"numpy": "python3-numpy", "matplotlib": "python3-matplotlib", "h5py": "python3-h5py"}
 KINDS = ("profiles", "surface", "cuts", "energy", "balance", "all")
-COLOURS = ("u_n", "H", "K", "p")
+COLOURS = ("H", "K", "u_n", "p", "H0", "energy_density")
 SCALES = ("run", "shape")
 PLANE = re.compile(r"([xyz])=([-+.\deE]+)")
 BAD_INPUT = "invalid input, and nothing was written; or the output could not be written"
@@ -61,9 +61,9 @@ def listed(parse):
 
 def time(text):
     try:
-        return number()(text)
+        return math.inf if text == "end" else number()(text)
     except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list of numbers t1,t2,...") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list of numbers t1,t2,... or end") from None
 
 
 def one_of(words):
@@ -91,6 +91,14 @@ def plane(text):
         return found[1], number()(found[2])
     except (TypeError, argparse.ArgumentTypeError):
         raise argparse.ArgumentTypeError(f"'{text}' is not x, y or z = number, such as z=0") from None
+
+
+def camera(text):
+    try:
+        azimuth, elevation = text.split(",")
+        return number(-360, 360)(azimuth), number(-90, 90)(elevation)
+    except (ValueError, argparse.ArgumentTypeError):
+        raise argparse.ArgumentTypeError(f"'{text}' is not AZIMUTH,ELEVATION in degrees, up to 360 and 90, such as -37,22") from None
 
 
 # ---- the three commands
@@ -189,24 +197,27 @@ def plot():
     option("results", metavar="RESULT", nargs="+", help="result files; several are labelled by what differs in their cases")
     option("-o", "--output", type=file_name, action="append", default=[],
            help="picture to write, .png, .svg or .pdf; may be repeated (default: both RESULT.png and .svg)")  # fmt: skip
-    option("--times", type=listed(time), metavar="T1,T2,...", help="times of the frames, such as 0,0.05,1.4 (default: up to six frames)")
-    option("--kind", type=one_of(KINDS), words=KINDS, default="all", help=f"what to draw: {', '.join(KINDS)}")
+    option("--times", type=listed(time), metavar="T1,T2,...", help="times of the frames, such as 0,0.05,end (default: up to six frames, between which the energy changes equally)")
+    option("--kind", type=listed(one_of(KINDS)), words=KINDS, default="all", help=f"what to draw: {', '.join(KINDS)}, or several as in surface,energy")
     option("--colour", type=listed(colour), words=COLOURS, action="extend", default=[],
-           help="quantities to colour surfaces by: u_n (with arrows for the flow along them), H, K, p, of an equilibrium mode_1 ..., or several as in u_n,H "
-                "(default: u_n of surfaces that move, else H,K)")  # fmt: skip
+           help="quantities to colour shapes by: H, K, u_n (with arrows for the flow along them), p, H0, energy_density, of a surface in equilibrium "
+                "mode_1 ..., or several as in u_n,H (default: H of surfaces that move, else H,K; profiles: left and right half)")  # fmt: skip
     option("--scale", type=one_of(SCALES), words=SCALES, default="run",
            help="velocities are drawn relative to the largest one of the run, or of each shape")  # fmt: skip
     option("--label", action="append", default=[], help="label of a result, one for each, in their order (default: what differs in their cases)")
+    option("--camera", type=camera, metavar="AZIMUTH,ELEVATION", default="-37,22", help="from where surfaces are seen, in degrees from the x axis and above its plane")
     option("--plane", type=plane, default="z=0", help="of the cuts through surfaces: x, y or z = number")
     option("--series", type=listed(str), action="extend", default=[],
            help="series to draw instead of all else, such as r_min,r_max; `tubule show --csv` lists them")  # fmt: skip
     option("--x", default="time", help="with --series: the series they are drawn against")
-    option("--from", type=number(), metavar="FLOAT", dest="low", help="with --series: draw from this value of --x")
-    option("--to", type=number(), metavar="FLOAT", dest="high", help="with --series: draw up to this value of --x")
-    option("--logy", type=None, help="with --series: logarithmic axis")
+    option("--from", type=number(), metavar="FLOAT", dest="low", help="draw series from this value of --x, energies from this time")
+    option("--to", type=number(), metavar="FLOAT", dest="high", help="draw series up to this value of --x, energies up to this time")
+    option("--logx", type=None, help="of series and energies: logarithmic horizontal axis")
+    option("--logy", type=None, help="with --series: logarithmic vertical axis")
     option("--quantity", default="", help="of a scan: what its map shows: outcome (default), energy, r_min, volume, steps ... (all columns of show --csv)")
     option("--slice", action="append", default=[], help="of a scan with more than two axes: key=value of an axis that is cut; may be repeated")
     option("--confirmed", help="of a scan: the output of `tubule confirm --json`, whose points are marked on the map")
+    option("--width", type=number(3, 20), metavar="FLOAT", default="7", help="inches of the page; below 5, for a column of a journal, legends and colour bars are below each other")
     option("--dpi", type=number(30, 1200), metavar="FLOAT", default="300", help="pixels per inch of a .png, and of surfaces within .svg and .pdf")
     option("--movie", help="film to write instead, .mp4 (needs ffmpeg) or .gif: the shape of one result, frame by frame, "
                            "coloured by H or the given --colour, and its energy")  # fmt: skip
@@ -255,8 +266,8 @@ def plot_options(words):
     for name in options.results if options.times else ():  # "--times 0 0.1 10"
         if re.fullmatch(r"[-+.\deE]+", name) and not os.path.exists(name):
             raise BadInput(f"--times: several times are separated by commas, without spaces: --times {options.times[-1]:g},{name}")
-    if not options.series and (options.low is not None or options.high is not None or options.logy or options.x != "time"):
-        raise BadInput("tubule plot: --x, --from, --to and --logy belong to --series")
+    if not options.series and (options.logy or options.x != "time"):
+        raise BadInput("tubule plot: --x and --logy belong to --series")
     options.times = options.times or []
     return options
 

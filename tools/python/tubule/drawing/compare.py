@@ -83,7 +83,7 @@ class Page:
         if self.tolerances:
             handles.append(Line2D([], [], color="0.4", linestyle="-.", linewidth=0.8))
             labels.append("tolerance")
-        style.legend_beside(axes, handles, labels=labels)
+        axes.legend(handles=handles, labels=labels, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0)
 
     def _tolerance(self, axes, name, colour):
         if self.tolerances.get(name, 0) > 0:

@@ -1,5 +1,5 @@
-"""Panel of profiles that are not graphs r(z), or that flow: sections through the axis, coloured by the normal velocity, with
-arrows for the velocity along the profile. Shapes without a velocity are coloured by H and K."""
+"""Panel of profiles that are not graphs r(z): sections through the axis, coloured by H and K, or other quantities; by the
+normal velocity with arrows for the velocity along the profile."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,7 +9,8 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.path import Path
 
-from .colours import draw_bar
+from . import style
+from .colours import BAR_HEIGHT, draw_bar
 from .flow import LONGEST_ARROW, SHORTEST_ARROW, SYMBOLS, VELOCITY, Motion, arrow_style, draw_arrow_key
 from .labels import power, symbol
 from .tubes import ProfilePanel, caption
@@ -59,9 +60,10 @@ class CurvePanel(ProfilePanel):
     COLUMN_GAP = 0.1
     MAX_LENGTH = 3.2
 
-    def __init__(self, results, labels, columns):
+    def __init__(self, results, labels, columns, names):
         self.motions = [Motion(result.frames) for result in results]
-        super().__init__(results, labels, columns)
+        self.velocity = names == ["u_n"]
+        super().__init__(results, labels, columns, names)
 
     def scale_by_run(self):
         """Velocities are relative to the largest ones of their run, else of each shape."""
@@ -69,7 +71,6 @@ class CurvePanel(ProfilePanel):
             motion.by_run = True
 
     def _choose_colours(self):
-        self.velocity = any(frame.u_n is not None for frame in self.shapes)
         if not self.velocity:
             super()._choose_colours()
 
@@ -80,7 +81,7 @@ class CurvePanel(ProfilePanel):
             key = result.case.get("equilibrium", {}).get("branch", {}).get("vary", "parameter")
             name = symbol(key.split(".")[-1]).replace("_", " ")
             words.append(f"{name}{chr(10) if len(name) > 8 else ' '}= {power(frame.parameter, 4)}")
-        if frame and frame.u_n is not None:
+        if self.velocity and frame and frame.u_n is not None:
             words.append(self.motions[row].words(frame))
         return "\n".join(word for word in words if word)
 
@@ -99,7 +100,7 @@ class CurvePanel(ProfilePanel):
             axes.add_collection(
                 LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
             )
-            for along in arrows(section, section.at(frame.u_t), u_t) if u_t else ():
+            for along in arrows(section, section.at(frame.u_t), u_t) if self.velocity and u_t else ():
                 way_x, way_y = section.beside(along, ARROW_DISTANCE)
                 way = Path(np.column_stack([x + side * way_x, y + way_y]))
                 axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(along[-1] - along[0]))))
@@ -107,22 +108,26 @@ class CurvePanel(ProfilePanel):
 
     def _colour(self, section, frame, side, largest):
         if not self.velocity:
-            colours, values = (self.H, frame.H) if side < 0 else (self.K, frame.K)
+            _, values, colours = self._halves(frame)[side > 0]
             return colours.rgb(section.at(values))
         if frame.u_n is None:
             return np.full((section.x.size, 3), 0.7)
         relative = section.at(frame.u_n) / largest if largest else np.zeros(section.x.size)
         return plt.get_cmap(VELOCITY)(0.5 + relative / 2)[:, :3]
 
+    def bars(self):
+        return 1 + any(frame.u_t is not None for frame in self.shapes) if self.velocity else super().bars()
+
     def draw_colour_bars(self, figure, bottom):
         if not self.velocity:
             super().draw_colour_bars(figure, bottom)
             return
-        flows = any(frame.u_t is not None for frame in self.shapes)
         what = "run" if self.motions[0].by_run else "shape"
-        left, width = (0.06, 0.42) if flows else (0.29, 0.42)
-        draw_bar(figure, bottom, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
+        room = style.slots(self.bars())
+        left, width, line = room[0]
+        draw_bar(figure, bottom + line * BAR_HEIGHT, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
                  f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the {what}, > 0: outward")  # fmt: skip
-        if flows:
+        if len(room) > 1:
             words = f"velocity {SYMBOLS['u_t']} along the profile;\nthis long: max |{SYMBOLS['u_t']}| of the {what}"
-            draw_arrow_key(figure, left + width + 0.05, bottom, words)
+            left, _, line = room[-1]
+            draw_arrow_key(figure, left, bottom + line * BAR_HEIGHT, words)

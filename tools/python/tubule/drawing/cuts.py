@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
-from . import raster
+from . import raster, style
 from .labels import MINUS, number
 from .results import BadInput
-from .style import WIDTH, line_colours, time_title
+from .style import line_colours, time_title
 
 PIECES, FEWEST = 300, 2  # along the side of a square of all cells; minimum per cell
 HALVINGS = 48  # of the side of a piece
@@ -64,7 +64,7 @@ class CutPanel:
         rim = 0.05 * (high - low).max()
         self.low, self.high = low - rim, high + rim
         wide, tall = self.high - self.low
-        room = (WIDTH - LEFT - LEGEND - GAP * len(results)) / len(results)
+        room = (style.WIDTH - LEFT - LEGEND - GAP * len(results)) / len(results)
         self.scale = min(room / wide, HEIGHT / tall)
         self.wide, self.tall = self.scale * wide, self.scale * tall
         self.height = self.tall + 0.62

@@ -1,20 +1,25 @@
 """Panel (b): bending energy over time, in total and by term, with the times of the profiles marked. Where the membrane
-has inertia, its kinetic energy is a band on top. Stationary shapes have an index instead of a time."""
+has inertia, each result has axes of its own, with its kinetic energy as a band on top and the first moments as an inset.
+Equilibria are over the parameter of their branch."""
 
 import numpy as np
 from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter
 
-from .labels import formula, number
-from .style import DASHES, MARKERS, WIDTH, axes_at, legend_beside, line_colours, time_name, time_text
+from . import style
+from .labels import formula, number, symbol
+from .style import DASHES, MARKERS, Legend, axes_at, few_ticks, line_colours, time_name, time_text
 
 STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
 HEIGHT = 2.15  # inches of the axes
 KINETIC, BAND_ALPHA = "kinetic E\u2096, up to E + E\u2096", 0.25
 VISIBLE = 2e-3  # part of the total below which a term would coincide with the zero line
-LEAST_CHANGE = 0.05  # of the height of the panel: terms are left out rather than that the total shows less of it
+LEAST_CHANGE = 0.25  # of the height of the panel: terms are left out rather than that the total shows less of it
+INSET = 0.45, 0.42, 0.53, 0.55  # of the first moments: left, bottom, width, height as parts of the axes
+ROOM = 0.62  # inches for labels below and above the axes
+MOST_AXES = 4  # beside each other
 SETTLED = 0.3  # the initial phase ends when this part of the change is left
 
 
@@ -91,21 +96,27 @@ def relative_ticks(axis, name):
 
 
 class EnergyPanel:
-    """Lines of `results` (all with an energy series); one label per result; `times` marked on them."""
+    """Lines of `results` (all with an energy series); one label per result; `times` marked on them. `window`: first and last
+    time or None, and whether the axis is logarithmic."""
 
-    def __init__(self, results, labels, times):
+    def __init__(self, results, labels, times, window=(None, None, False)):
         self.results, self.times = results, times
+        self.low, self.high, self.logx = window
         self.term_labels = {name: label for result in results for name, label in result.term_labels.items()}
         self.lone = len(results) == 1
-        self.numbered = all(result.is_equilibrium for result in results)
         self.kinetic = any(result.has_inertia for result in results)
         self.total = "bending E" if self.kinetic else "total"
         self.labels = [self.total] if self.lone else [_lines_of(label) for label in labels]
         self.end = max(result.series["time"][-1] for result in results) or 1.0  # a run with only its start
+        if self.high is not None:
+            self.end = min(self.end, self.high)
         self.settled = max(map(settling_time, results))
         self.colours = line_colours(len(results))
         self.terms = [] if self._terms_hide_change() else visible_terms(results)
-        self.height = HEIGHT + 0.62
+        self.apart = self.kinetic and 1 < len(results) <= MOST_AXES
+        self.rows = len(results) if self.apart and style.is_narrow() else 1
+        self.legend = Legend(self._legend_entries())
+        self.height = self.rows * (HEIGHT + ROOM) + self.legend.below
 
     def _terms_hide_change(self):
         """Whether an axis with all terms would show the total as a straight line."""
@@ -119,45 +130,77 @@ class EnergyPanel:
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        handles = self._legend_entries()
-        longest = max(len(line) for handle in handles for line in handle.get_label().split("\n"))
-        left, bottom = 0.6, bottom + 0.38
-        wide = figure.get_figwidth() - (0.5 + 0.06 * longest) - 0.1 - left
+        self.every = list(zip(self.results, self.colours, MARKERS * len(self.results)))
+        left, wide, gap = 0.6, figure.get_figwidth() - 0.7 - (self.legend.right or 0.1), 0.3
+        low = bottom + self.legend.below + 0.38
+        decades = self.logx or (self.low is None and self.settled < 0.01 * self.end)
+        start = self.low if self.low is not None else self._first_time() if decades else 0.0
         initial = min((t for t in self.times if t >= self.settled), default=self.settled) * 1.03
-        decades = self.settled < 0.01 * self.end
-        if initial < 0.3 * self.end and not decades:
-            gap = 0.3
+        split = not decades and self.low is None and initial < 0.3 * self.end
+        if self.apart:
+            axes = self._draw_apart(figure, left, low, wide, start, decades)
+        elif split and not self.kinetic and not style.is_narrow():
             half = (wide - gap) / 2
-            first = axes_at(figure, left, bottom, half, HEIGHT)
-            last = axes_at(figure, left + half + gap, bottom, half, HEIGHT, sharey=first)
-            last.tick_params(labelleft=False)
-            self._lines(first, 0, initial, False)
-            self._lines(last, 0, self.end, False)
-            first.set_xlabel("time t (initial phase)", labelpad=2)
-            last.set_xlabel("time t (whole run)", labelpad=2)
+            axes = [axes_at(figure, left, low, half, HEIGHT)]
+            axes.append(axes_at(figure, left + half + gap, low, half, HEIGHT, sharey=axes[0]))
+            axes[1].tick_params(labelleft=False)
+            self._lines(axes[0], 0, initial, False)
+            self._lines(axes[1], 0, self.end, False)
+            axes[0].set_xlabel("time t (initial phase)", labelpad=2)
+            axes[1].set_xlabel("time t (whole run)", labelpad=2)
         else:
-            first = last = axes_at(figure, left, bottom, wide, HEIGHT)
-            self._lines(first, self._first_time() if decades else 0.0, self.end, decades)
-            first.set_xlabel("number of the shape" if self.numbered else "time t", labelpad=2)
-        first.set_ylabel(relative_ticks(first.yaxis, "energy" if self.kinetic else "bending energy E"), labelpad=3)
-        legend_beside(last, handles, labelspacing=0.45)
+            axes = [axes_at(figure, left, low, wide, HEIGHT)]
+            self._lines(axes[0], start, self.end, decades)
+            axes[0].set_xlabel("time t", labelpad=2)
+            if split:
+                self._draw_inset(axes[0], self.every, initial)
+        name = relative_ticks(axes[0].yaxis, "energy" if self.kinetic else "bending energy E")
+        for one in axes if self.rows > 1 else axes[:1]:
+            one.set_ylabel(name, labelpad=3)
+        self.legend.draw(axes[-1], bottom)
+
+    def _draw_apart(self, figure, left, low, wide, start, decades):
+        """The axes of one result each, the first at the top or on the left."""
+        count, gap, drawn = len(self.results), 0.12, []
+        first = min(map(settling_time, self.results))
+        for k, (one, label) in enumerate(zip(self.every, self.labels)):
+            size = wide if self.rows > 1 else (wide - gap * (count - 1)) / count
+            x, y = (left, low + (count - 1 - k) * (HEIGHT + ROOM)) if self.rows > 1 else (left + k * (size + gap), low)
+            axes = axes_at(figure, x, y, size, HEIGHT, sharey=drawn[0] if drawn else None)
+            axes.tick_params(labelleft=self.rows > 1 or k == 0)
+            self._lines(axes, start, self.end, decades, [one])
+            axes.set_xlabel("time t", labelpad=2)
+            axes.set_title(label, pad=11)
+            drawn.append(axes)
+        for axes, one in zip(drawn, self.every):  # when the common range of energies is known
+            if not decades and self.low is None and first < 0.3 * self.end:
+                self._draw_inset(axes, [one], first)
+        return drawn
+
+    def _draw_inset(self, axes, some, end):
+        inset = axes.inset_axes(INSET)
+        inset.tick_params(labelsize=6, length=2, pad=1.5)
+        self._lines(inset, 0.0, end, False, some, named=False)
+        few_ticks(inset.xaxis, 1.0, 0.4)
+        few_ticks(inset.yaxis, 1.0, 0.4)
+        for line in inset.lines:
+            line.set_markersize(2.5)
 
     def _first_time(self):
         steps = [result.series["time"][1] for result in self.results if result.series["time"].size > 1]
         positive = [time for time in self.times if time > 0] + steps
         return max(min(positive) / 3, 1e-6 * self.end)
 
-    def _lines(self, axes, start, end, log):
+    def _lines(self, axes, start, end, log, some=None, named=True):
         if log:
             axes.set_xscale("log")
         axes.set_xlim(start, end if log else end + 0.02 * (end - start))
         if not log:
-            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+            few_ticks(axes.xaxis, axes.get_position().width * style.WIDTH, 0.4)
         grid = (np.geomspace if log else np.linspace)(start, end, 500)
-        for result, colour, marker in zip(self.results, self.colours, MARKERS * len(self.results)):
-            self._lines_of_result(axes, result, grid, colour, marker)
-        self._mark_times(axes, start, end)
+        for one in some or self.every:
+            self._lines_of_result(axes, one[0], grid, *one[1:])
+        self._mark_times(axes, start, end, named)
 
     def _lines_of_result(self, axes, result, grid, colour, marker):
         time, start, end = result.series["time"], grid[0], grid[-1]
@@ -182,16 +225,16 @@ class EnergyPanel:
         if result.stopped_early and start <= time[-1] <= end:
             axes.plot(time[-1], result.series["energy"][-1], clip_on=False, zorder=5, **STOP_MARK)
 
-    def _mark_times(self, axes, start, end):
+    def _mark_times(self, axes, start, end, named):
         """t0, t1, ... above the axes; of overlapping labels only the first is kept."""
-        inches = axes.get_position().width * WIDTH
+        inches = axes.get_position().width * style.WIDTH
         before = -1.0
         for index, time in enumerate(self.times):
             if not start <= time <= end:
                 continue
             axes.axvline(time, color="0.75", linewidth=0.5, zorder=0)
             place = axes.transLimits.transform(axes.transScale.transform((time, 1)))[0] * inches
-            if place - before > 0.095 and not self.numbered:
+            if named and place - before > 0.095:
                 axes.annotate(time_name(index), (time, 1), (0, 2), xycoords=("data", "axes fraction"),
                               textcoords="offset points", ha="center", va="bottom", fontsize=7)  # fmt: skip
                 before = place
@@ -199,10 +242,10 @@ class EnergyPanel:
     def _legend_entries(self):
         handles = []
         for result, label, colour, marker in zip(self.results, self.labels, self.colours, MARKERS * len(self.results)):
-            handles.append(Line2D([], [], color=colour, marker=marker, mec="white", mew=0.4, label=label))
+            if not self.apart:  # else its axes have its name
+                handles.append(Line2D([], [], color=colour, marker=marker, mec="white", mew=0.4, label=label))
             if result.stopped_early:
-                time = time_text(result.about.get("stop_time", result.end_time))
-                text = result.stopped_early if self.numbered else f"{result.stopped_early} at t = {time}"
+                text = f"{result.stopped_early} at t = {time_text(result.about.get('stop_time', result.end_time))}"
                 handles.append(Line2D([], [], label=text, **STOP_MARK))
         shade = self.colours[0] if self.lone else "0.3"
         if self.kinetic:
@@ -214,3 +257,40 @@ class EnergyPanel:
                 text = formula(self.term_labels.get(name, f"E_{{{name}}}"))
                 handles.append(Line2D([], [], color=shade, linewidth=0.9, linestyle=dashes, label=text))
         return handles
+
+
+class BranchPanel:
+    """Energies of equilibria over the parameter of their branch; the shapes that are drawn are marked by their numbers."""
+
+    def __init__(self, results, labels, numbers):
+        self.results, self.numbers = results, numbers
+        self.colours = line_colours(len(results))
+        labels = [_lines_of(label) for label in labels] if len(results) > 1 else []
+        self.legend = Legend([Line2D([], [], color=colour, label=label) for colour, label in zip(self.colours, labels)])
+        self.height = HEIGHT + ROOM + self.legend.below
+
+    def draw(self, figure, bottom):
+        """Draws the panel with its lower edge `bottom` inches above that of the figure."""
+        axes = axes_at(figure, 0.6, bottom + self.legend.below + 0.38, figure.get_figwidth() - 0.7 - (self.legend.right or 0.1), HEIGHT)
+        for result, colour in zip(self.results, self.colours):
+            rows = result.series
+            x, y = (rows["parameter"], rows["energy"]) if "parameter" in rows else (rows["time"], rows["energy"])
+            ends = np.flatnonzero(np.diff(rows["branch"])) + 1 if "branch" in rows else []
+            for part in np.split(np.arange(x.size), ends):
+                if part.size:
+                    fine = np.linspace(part[0], part[-1], 20 * part.size)
+                    axes.plot(*(monotone_cubic(part.astype(float), values[part], fine) for values in (x, y)), color=colour)
+            for shape in self.numbers:
+                if shape in rows["time"]:
+                    at = np.searchsorted(rows["time"], shape)
+                    axes.plot(x[at], y[at], "o", color=colour, mec="white", mew=0.4, clip_on=False)
+                    axes.annotate(number(shape), (x[at], y[at]), (3, 3), textcoords="offset points", fontsize=6)
+            if result.stopped_early:
+                axes.plot(x[-1], y[-1], clip_on=False, zorder=5, **STOP_MARK)
+        few_ticks(axes.xaxis, axes.get_position().width * style.WIDTH)
+        keys = {result.case.get("equilibrium", {}).get("branch", {}).get("vary") for result in self.results}
+        name = symbol(keys.pop().split(".")[-1]).replace("_", " ") if len(keys) == 1 and None not in keys else "parameter of the branch"
+        along = all("parameter" in result.series for result in self.results)
+        axes.set_xlabel(name if along else "number of the shape", labelpad=2)
+        axes.set_ylabel(relative_ticks(axes.yaxis, "bending energy E"), labelpad=3)
+        self.legend.draw(axes, bottom)

@@ -7,7 +7,7 @@ from .labels import power
 from .results import tangential
 
 LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
-STILL = 1e-4  # part of the largest speed of a run below which a shape is drawn as at rest
+STILL = 5e-3  # part of the largest speed of a run below which a shape is drawn as at rest
 ROUNDING = 1e-6  # lengths per unit of time: speeds of an initial shape that does not move
 VELOCITY = "RdBu_r"
 SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
@@ -53,6 +53,8 @@ class Motion:
     def words(self, shape):
         """The caption below the picture."""
         found = {"u_n": self.largest("u_n", shape), "u_t": self.largest("u_t", shape), "u_theta": shape.largest("u_theta")}
+        if not any(found.values()) and shape.speed > ROUNDING * shape.size:
+            return f"|u| \u2264 {power(shape.speed, 2)}"
         return "\n".join(f"|{SYMBOLS[name]}| \u2264 {power(value, 2)}" for name, value in found.items() if value) or "at rest"
 
 

@@ -1,10 +1,12 @@
 """The differences between cases, in words short enough for a picture. Standard library only."""
 
+import re
 import textwrap
 
 SUBSCRIPT = {str(d): chr(0x2080 + d) for d in range(10)}
 SUPERSCRIPT = dict(zip("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b"))
 MINUS = "\u2212"
+LETTERS = {"nabla": "\u2207", "kappa": "\u03ba", "alpha": "\u03b1", "gamma": "\u03b3", "sigma": "\u03c3", "Pi": "\u03a0", "rho": "\u03c1", "pi": "\u03c0"}
 NOT_SET = object()
 LONGEST_LABEL = 200  # characters: more than is to be read in a picture
 MAX_DIFFERENCES = 4  # cases with more differences are labelled by their names
@@ -43,13 +45,27 @@ def flatten(node, prefix=""):
     return flat
 
 
+def sorted_by_value(cases):
+    """Their indices, by the numbers in which the cases differ; as they are where they differ in other things."""
+    flats = [flatten(case) for case in cases]
+    keys = differing_keys(flats)
+    rows = [[flat.get(key) for key in keys] for flat in flats]
+    if len(keys) > MAX_DIFFERENCES or not all(isinstance(value, (int, float)) for row in rows for value in row):
+        return list(range(len(cases)))
+    return sorted(range(len(cases)), key=rows.__getitem__)
+
+
+def differing_keys(flats):
+    return [key for key in dict.fromkeys(key for flat in flats for key in flat) if not key.startswith(IGNORED)
+            and any(flat.get(key, NOT_SET) != flats[0].get(key, NOT_SET) for flat in flats)]  # fmt: skip
+
+
 def row_labels(cases, fallbacks):
     """One list of words ("k42 = 0.06", ...) per case: the differences, else its fallback."""
     if len(cases) == 1:
         return [[fallbacks[0]]]
     flats = [flatten(case) for case in cases]
-    keys = [key for key in dict.fromkeys(key for flat in flats for key in flat) if not key.startswith(IGNORED)
-            and any(flat.get(key, NOT_SET) != flats[0].get(key, NOT_SET) for flat in flats)]  # fmt: skip
+    keys = differing_keys(flats)
     if len(keys) > MAX_DIFFERENCES:
         return [[fallback] for fallback in fallbacks]
     one_mode = not any(key.startswith("shape.mode.1.") for flat in flats for key in flat)
@@ -108,9 +124,9 @@ def wrapped(words, width):
 
 
 def formula(mathtext):
-    """k_{20}(H-H_0)^2 with real sub- and superscripts, so that it is plain text in an SVG."""
+    """k_{20}(H-H_0)^2, \\sigma with real sub- and superscripts and letters, so that it is plain text in an SVG."""
     out, table, braced = [], None, False
-    for char in mathtext.replace("\\nabla ", "\u2207"):
+    for char in re.sub(r"\\(\w+) ?", lambda name: LETTERS.get(name[1], name[0]), mathtext):
         if char in "_^":
             table = SUBSCRIPT if char == "_" else SUPERSCRIPT
         elif char == "{":

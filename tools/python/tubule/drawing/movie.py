@@ -9,16 +9,14 @@ import time
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from . import flow, raster
-from .colours import Colours, curvature_colours, draw_bar, pressure_colours
+from . import raster
+from .colours import colours_of, draw_bar
 from .command_line import Unavailable, say
-from .labels import number, symbol
+from .labels import symbol
 from .results import BadInput, Surface
-from .style import draw_scale_bar, line_colours, time_text
+from .style import draw_scale_bar, few_ticks, line_colours, time_text
 from .surfaces import node_areas
 from .tubes import ring_areas
 
@@ -33,7 +31,7 @@ def as_surface(frame, name):
     """The frame; the surface of revolution of a profile with this field: flat triangles with the normals of the profile."""
     if isinstance(frame, Surface):
         return frame
-    values = getattr(frame, name)
+    values = frame.quantity(name)
     step = np.hypot(np.diff(frame.r), np.diff(frame.z))
     along = np.concatenate([[0], np.cumsum(step)])
     places = np.linspace(0, along[-1], ALONG + 1)
@@ -58,30 +56,21 @@ def as_surface(frame, name):
     return Surface(frame.time, 1, bool(poles or ring), triangles(grid(r, z)), triangles(grid(*way.T)), **{"H": there, "K": there, name: there})
 
 
-def colours_of(result, frames, name):
+def shared_colours(result, frames, name):
     """One scale for all frames."""
-    if any(getattr(frame, name, None) is None for frame in frames):
+    if any(frame.quantity(name) is None for frame in frames):
         raise BadInput(f"--colour: not all frames have {name}")
     areas = [(node_areas if isinstance(frame, Surface) else ring_areas)(frame).ravel() for frame in frames]
-    if name in "HK":
-        colours = curvature_colours([result], frames, areas)["HK".index(name)]
-        colours.label = colours.label.format("")
-        return colours
-    values = [getattr(frame, name).ravel() for frame in frames]
-    if name == "u_n":
-        largest = max(float(np.abs(v).max()) for v in values) or 1.0
-        label = f"normal velocity {flow.SYMBOLS['u_n']}, > 0: outward"
-        return Colours(flow.VELOCITY, Normalize(-largest, largest), "neither", label)
-    return pressure_colours(values, areas)
+    return colours_of(name, [result], frames, areas)
 
 
 class Stage:
     """The page on which one frame after the other is drawn."""
 
-    def __init__(self, result, frames, name, title):
+    def __init__(self, result, frames, name, title, camera=raster.CAMERA):
         self.result, self.frames, self.quantity = result, frames, name
-        self.colours = colours_of(result, frames, name)
-        self.view = raster.View()
+        self.colours = shared_colours(result, frames, name)
+        self.view = raster.View(*camera)
         ends = [self.view.extent(as_surface(frame, "H").points.reshape(-1, 3)) for frame in frames]
         self.low, self.high = np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
         self.scale = min(np.array(BOX[2:]) / (self.high - self.low))  # inches per unit of length
@@ -123,8 +112,7 @@ class Stage:
         ends = np.flatnonzero(np.diff(series.get("branch", series["energy"] * 0))) + 1
         for x, y in zip(np.split(series[key], ends), np.split(series["energy"], ends)):
             axes.plot(x, y, color=line_colours(1)[0])
-        axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))  # few: numbers of small times are long
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+        few_ticks(axes.xaxis, 2.4, 0.6)  # numbers of small times are long
         axes.set(xlabel=self.name if parameter else "time t", ylabel="energy E")
         (self.dot,) = axes.plot([], [], "o", color="C3", markersize=6)
         self.energy = np.asarray(series[key]), np.asarray(series["energy"])
@@ -135,7 +123,7 @@ class Stage:
         width, height = self.pixels
         per_unit = self.scale * DPI * raster.OVERSAMPLING
         samples = raster.sample(
-            shape.points, shape.normal, getattr(shape, self.quantity)[..., None], shape.order, shape.closed, self.view,
+            shape.points, shape.normal, shape.quantity(self.quantity)[..., None], shape.order, shape.closed, self.view,
             (self.low[0], self.high[1]), per_unit, width * raster.OVERSAMPLING, height * raster.OVERSAMPLING,
         )  # fmt: skip
         there = np.isfinite(samples.depth)
@@ -175,12 +163,12 @@ def writer_for(path, fps):
     return FFMpegWriter(fps=fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-crf", "20"])
 
 
-def draw(result, frames, path, name, title, fps):
+def draw(result, frames, path, name, title, fps, camera):
     """Writes the film of these frames of a result, coloured by a quantity; a file of that name is replaced at the end."""
     writer = writer_for(path, fps)
     if len(frames) < 2:
         raise BadInput(f"{result.path}: has {len(frames)} frames; a film needs two or more (time.output in the case)")
-    stage, progress = Stage(result, frames, name, title), Progress(len(frames))
+    stage, progress = Stage(result, frames, name, title, camera), Progress(len(frames))
     base, ending = os.path.splitext(path)
     part = f"{base}.part{ending}"
     try:

@@ -2,19 +2,21 @@
 
 import os
 import sys
+import textwrap
 from operator import attrgetter
 
 from matplotlib.figure import Figure
 
 from . import command_line, scan, style
+from .colours import bars_height
 from .curves import CurvePanel
 from .cuts import CutPanel
-from .energy import EnergyPanel
-from .labels import as_label, row_labels
+from .energy import BranchPanel, EnergyPanel
+from .labels import as_label, row_labels, sorted_by_value
 from .results import BadInput, read_result
 from .series import BalancePanel, Choice, SeriesPanel, has_balance
 from .surfaces import SurfacePanel, choose_colours
-from .tubes import TubePanel, choose_columns
+from .tubes import TubePanel, check_quantities, choose_columns
 
 NOTHING = {
     "profiles": "no profiles",
@@ -38,8 +40,8 @@ class Page:
         self.results, self.labels, self.options = results, labels, options
         self.marked = []
 
-    def wants(self, *kinds):
-        return self.options.kind in (*kinds, "all")
+    def wants(self, kind):
+        return bool({kind, "all"} & set(self.options.kind))
 
     def profiles(self):
         if not any(r.frames for r in self.results):
@@ -48,8 +50,11 @@ class Page:
         self.marked = [column.time for column in columns if column.time is not None]
         if self.wants("profiles"):
             shown = [frame for column in columns for frame in column.cells if frame]
-            graphs = all(frame.is_graph and frame.u_t is None for frame in shown)
-            yield (TubePanel if graphs else CurvePanel)(self.results, self.labels, columns)
+            names = list(dict.fromkeys(self.options.colour or ["H", "K"]))
+            check_quantities(self.results, attrgetter("frames"), self.options.colour if any(frame.u_n is not None for frame in shown) else
+                             [name for name in self.options.colour if name != "u_n"])
+            graphs = all(frame.is_graph for frame in shown) and names != ["u_n"]
+            yield (TubePanel if graphs else CurvePanel)(self.results, self.labels, columns, names)
 
     def surfaces(self):
         shown = [(r, label) for r, label in zip(self.results, self.labels) if r.surfaces]
@@ -59,18 +64,22 @@ class Page:
         columns = choose_columns(results, self.options.times, attrgetter("surfaces"))
         self.marked = self.marked or [column.time for column in columns if column.time is not None]
         if self.wants("surface"):
-            yield SurfacePanel(results, labels, columns, choose_colours(results, self.options.colour))
-        if self.options.kind == "cuts" or (self.options.kind == "all" and all(r.moves for r in results)):
+            yield SurfacePanel(results, labels, columns, choose_colours(results, self.options.colour), self.options.camera)
+        if "cuts" in self.options.kind or ("all" in self.options.kind and all(r.moves for r in results)):
             yield CutPanel(results, labels, columns, self.options.plane)
 
     def series(self):
-        everything = self.options.kind == "all"
+        everything = "all" in self.options.kind
         if self.wants("energy"):
             # A surface at rest and a single stationary shape have one row, which makes no curve.
             least = [2 if everything and (r.surfaces or r.is_equilibrium) else 1 for r in self.results]
             shown = [i for i, r in enumerate(self.results) if r.has_energy(least[i])]
-            if shown:
-                yield EnergyPanel(*self._of(shown), self.marked)
+            equilibria = [i for i in shown if self.results[i].is_equilibrium]
+            runs = [i for i in shown if i not in equilibria]
+            if runs:
+                yield EnergyPanel(*self._of(runs), self.marked, (self.options.low, self.options.high, self.options.logx))
+            if equilibria:
+                yield BranchPanel(*self._of(equilibria), self.marked)
         if self.wants("balance"):
             shown = [i for i, r in enumerate(self.results) if has_balance(r) and (r.moves or not everything)]
             if shown:
@@ -82,7 +91,7 @@ class Page:
     def panels(self):
         if self.options.series:
             o = self.options
-            return [SeriesPanel(self.results, self.labels, Choice(o.series, o.x, o.low, o.high, o.logy))]
+            return [SeriesPanel(self.results, self.labels, Choice(o.series, o.x, o.low, o.high, o.logx, o.logy))]
         return [*self.profiles(), *self.surfaces(), *self.series()]
 
 
@@ -90,6 +99,8 @@ def figure_of(results, options):
     """Decides what can be drawn of the results and lays the panels out from top to bottom."""
     if not results:
         raise BadInput("no result to draw")
+    if not options.label:
+        results = [results[i] for i in sorted_by_value([r.case for r in results])]
     names = [as_label(os.path.splitext(os.path.basename(result.path))[0]) for result in results]
     labels = row_labels([r.case for r in results], names if len(results) > 1 else [results[0].title])
     if options.label:
@@ -98,16 +109,16 @@ def figure_of(results, options):
         labels = [[as_label(label)] for label in options.label]
     panels = Page(results, labels, options).panels()
     if not panels:
-        raise BadInput(f"{', '.join(result.path for result in results)}: {NOTHING[options.kind]} to draw{OTHER_TIER.get(options.kind, '')}")
+        raise BadInput(f"{', '.join(result.path for result in results)}: {NOTHING[options.kind[0]]} to draw{OTHER_TIER.get(options.kind[0], '')}")
 
-    bars = 0.62
-    title = 0.2 if len(results) == 1 else 0.0
+    heading = textwrap.wrap(", ".join(labels[0]), int(style.WIDTH / 0.072)) if len(results) == 1 else []
+    title = 0.16 * len(heading) + 0.04 * bool(heading)
     coloured = [panel for panel in panels if hasattr(panel, "draw_colour_bars")]
-    tall = title + sum(panel.height for panel in panels) + bars * len(coloured) + 0.1
+    tall = title + sum(panel.height for panel in panels) + sum(bars_height(panel.bars()) for panel in coloured) + 0.1
     figure = Figure(figsize=(style.WIDTH, tall))
     top = figure.get_figheight() - 0.05
     if title:
-        figure.text(0.5, top / figure.get_figheight(), ", ".join(labels[0]), ha="center", va="top", fontsize=9)
+        figure.text(0.5, top / figure.get_figheight(), "\n".join(heading), ha="center", va="top", fontsize=9)
         top -= title
     for panel in panels if options.scale == "run" else ():
         if hasattr(panel, "scale_by_run"):
@@ -118,7 +129,7 @@ def figure_of(results, options):
         if len(panels) > 1:
             figure.text(0.01, (top + panel.height) / figure.get_figheight(), f"({letter})", va="top", fontsize=9)
         if panel in coloured:
-            top -= bars
+            top -= bars_height(panel.bars())
             panel.draw_colour_bars(figure, top + 0.08)
     return figure
 
@@ -129,15 +140,15 @@ def draw_movie(options):
     paths = options.results
     if len(paths) > 1 or scan.is_scan(paths[0]):
         raise BadInput(f"{paths[0]}: --movie shows one result, and no scan")
-    if options.series or options.kind != "all" or options.output or len(options.colour) > 1 or options.dpi != style.DPI:
-        raise BadInput("--movie goes with --times, --label, --fps and one --colour only")
+    if options.series or options.kind != ["all"] or options.output or len(options.colour) > 1 or options.dpi != style.DPI or options.width != style.WIDTH:
+        raise BadInput("--movie goes with --times, --label, --fps, --camera and one --colour only")
     result = read_result(paths[0])
     frames = result.surfaces or result.frames
     if options.times:
         columns = choose_columns([result], options.times, attrgetter("surfaces" if result.surfaces else "frames"))
         frames = [column.cells[0] for column in columns if column.cells[0]]
     title = as_label(options.label[0]) if options.label else result.title
-    movie.draw(result, frames, options.movie, (options.colour or ["H"])[0], title, options.fps)
+    movie.draw(result, frames, options.movie, (options.colour or ["H"])[0], title, options.fps, options.camera)
 
 
 def draw_any(options, outputs):
@@ -148,7 +159,7 @@ def draw_any(options, outputs):
                 raise BadInput(f"{options.results[0]}: is no scan, to which --{option} belongs")
         style.save(figure_of([read_result(path) for path in options.results], options), outputs)
         return
-    if len(options.results) > 1 or options.times or options.colour or options.kind != "all" or options.series:
+    if len(options.results) > 1 or options.times or options.colour or options.kind != ["all"] or options.series:
         raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind and --series")
     style.save(scan.figure_of(options.results[0], options.quantity, options.slice, options.confirmed), outputs)
 
@@ -161,7 +172,7 @@ def main(options):
     base = os.path.splitext(options.results[0])[0]
 
     def draw(pictures):
-        with style.resolution(options.dpi):
+        with style.page(options.dpi, options.width):
             draw_any(options, pictures)
 
     return command_line.run(draw, options.output or [base + ".png", base + ".svg"], str)

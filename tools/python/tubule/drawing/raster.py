@@ -8,7 +8,7 @@ PIECE = 6.0  # longest side of a piece, in samples
 MAX_PIECES = 128  # along the side of a cell
 CHUNK = 400_000  # pieces at a time, to bound memory
 SLACK = 0.02  # overlap of pieces relative to their size, so that rounding leaves no holes
-LIGHT = np.array([-0.42, 0.5, 0.757])  # from the upper left, in front; unit, as right, up, towards the eye
+RIM_SHADE = 0.4  # how much darker a surface is where it is seen edge-on
 OUTLINE = 0.12  # grey level
 JUMPS = 0.01, 0.03  # depth between neighbours, relative to the picture, where an outline begins and where it is black
 
@@ -45,10 +45,13 @@ def division(n):
     return places, np.array(up + down)
 
 
+CAMERA = -37.0, 22.0  # azimuth and elevation in degrees
+
+
 class View:
     """Parallel projection along a direction, the z axis upright."""
 
-    def __init__(self, azimuth=-37.0, elevation=22.0):
+    def __init__(self, azimuth=CAMERA[0], elevation=CAMERA[1]):
         a, e = np.radians([azimuth, elevation])
         right = [-np.sin(a), np.cos(a), 0]
         up = [-np.cos(a) * np.sin(e), -np.sin(a) * np.sin(e), np.cos(e)]
@@ -131,6 +134,12 @@ def sample(nodes, normals, values, order, closed, view, origin, scale, width, he
     return out
 
 
+def shade(cosine):
+    """What is left of a colour where the normal has this cosine to the eye: all of it (97 % up to 60 degrees) but at the rim,
+    whatever the side, so that equal values look alike."""
+    return 1 - RIM_SHADE * (1 - np.clip(cosine, 0, 1)) ** 4
+
+
 def shaded(samples, colours):
     """RGBA picture, one pixel for OVERSAMPLING^2 samples; `colours` [n, 3] of the outside where
     something is, in the order of the samples."""
@@ -138,12 +147,8 @@ def shaded(samples, colours):
     outside = samples.outside[hit]
     normal = samples.normal[hit]
     normal /= np.where(outside, 1, -1)[:, None] * np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    shade = 0.56 + 0.46 * ((1 + normal @ LIGHT) / 2) ** 1.5  # no edge at the terminator
-    middle = LIGHT + [0, 0, 1]
-    gloss = 0.3 * np.clip(normal @ (middle / np.linalg.norm(middle)), 0, 1) ** 40
-    rgb = np.where(outside[:, None], colours, 0.35 * colours + 0.32)  # paler inside, and darker
-    rgb = np.clip(rgb * np.where(outside, shade, 0.75 * shade)[:, None], 0, 1)
-    rgb += (gloss * outside)[:, None] * (1 - rgb)
+    rgb = np.where(outside[:, None], colours, 0.26 * colours + 0.24)  # paler inside, and darker
+    rgb = rgb * shade(normal[:, 2])[:, None]
     rgba = np.zeros((hit.size, 4))
     rgba[hit] = np.column_stack([rgb, np.ones(len(rgb))])
     edge = (_edges(samples, hit) * hit)[:, None]

@@ -35,9 +35,14 @@ class Frame:
     u_n: np.ndarray | None = None  # velocity: outward,
     u_t: np.ndarray | None = None  # along the profile in the order of the points,
     u_theta: np.ndarray | None = None  # and around the axis
+    H0: np.ndarray | None = None  # where it varies
     energy_density: np.ndarray | None = None
     parameter: float | None = None  # on a branch of equilibria
     period: float = 0.0  # of a tube
+
+    def quantity(self, name):
+        """Values of H, K, u_n, H0 or energy_density; None where there are none."""
+        return getattr(self, name, None)
 
     @property
     def length(self):
@@ -77,6 +82,8 @@ class Surface:
     u: np.ndarray | None = None  # of a surface that moves: velocity, three components,
     u_n: np.ndarray | None = None  # outward,
     p: np.ndarray | None = None  # and pressure, where there is one
+    H0: np.ndarray | None = None  # where it varies
+    energy_density: np.ndarray | None = None
     modes: dict = field(default_factory=dict)  # of an equilibrium: normal displacements mode_1, ...
     # As the file has them:
     period: float = 0.0
@@ -86,7 +93,7 @@ class Surface:
     parameter = None
 
     def quantity(self, name):
-        """Values of H, K, u_n, p or a mode; None where there are none."""
+        """Values of H, K, u_n, p, H0, energy_density or a mode; None where there are none."""
         return self.modes.get(name) if name.startswith("mode_") else getattr(self, name)
 
     @property
@@ -307,7 +314,7 @@ def _arrays(path, name, group, keys):
 
 
 def _profile(path, name, record):
-    keys = ["z", "r", "H", "K", *(key for key in ("u_n", "u_t", "u_theta", "energy_density") if key in record)]
+    keys = ["z", "r", "H", "K", *(key for key in ("u_n", "u_t", "u_theta", "H0", "energy_density") if key in record)]
     arrays = dict(zip(keys, _arrays(path, name, record, keys)))
     if any(array.ndim != 1 or array.shape != arrays["z"].shape or array.size < 2 for array in arrays.values()):
         raise BadInput(f"{path}: frame {name}: {', '.join(keys)} must be lists of one length, 2 or more")
@@ -327,7 +334,7 @@ def _surface(path, name, record, meshes):
     cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     (points,) = _arrays(path, name, record, ("Points",))
     data = record["PointData"]
-    keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p", "energy_density") if key in data)]
+    keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p", "H0", "energy_density") if key in data)]
     keys += sorted(key for key in data if key.startswith("mode_"))
     arrays = dict(zip(keys, _arrays(path, name, data, keys)))
     vectors = [array for key, array in arrays.items() if key in ("normal", "u")]
@@ -337,7 +344,7 @@ def _surface(path, name, record, meshes):
         raise BadInput(f"{path}: frame {name}: {names} must have one row per point")
     if ("u" in arrays) != ("u_n" in arrays):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
-    nodes, drawn = {"points": points} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p")
+    nodes, drawn = {"points": points} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p", "H0", "energy_density")
     of_cells = {key: array[cells] for key, array in nodes.items() if key in drawn}
     if period > 0:
         join_periods(of_cells["points"], period)

@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import textwrap
+import tomllib
 
 import h5py
 import numpy as np
@@ -13,10 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from . import style
-from .labels import as_label, formula
+from .labels import as_label, flatten, formula, number, symbol
 from .results import BadInput, opened, values
 
-HEIGHT = 4.2  # inches
+LEFT, BELOW, PANEL, ABOVE, BAR = 0.6, 0.45, 3.3, 0.27, 0.9  # inches: beside and below the axes, their height, title, colour bar
 # By name of the outcome: light for equilibria, dark for early stops.
 COLOURS = {
     "uniform-tube": "#d6e4f0",
@@ -73,8 +75,31 @@ NAMES = {
     "model.pressure": "pressure " + formula("\\Pi"),
     "model.force": "axial force " + formula("N"),
     "shape.radius": "radius",
+    "equilibrium.area": "area",
+    "equilibrium.volume": "volume",
     "shape.mode.0.amplitude": "amplitude A",
 }
+
+
+CAPTION = re.compile(r"energy\..*|shape\.(radius|length|a|b|c|mode\..*amplitude)|model\.(kind|tension|pressure|force|Re|gamma)|equilibrium\.(area|volume|reduced_volume)")
+
+
+def name_of(key):
+    modulus = re.fullmatch(r"energy\.(k(\d+|g))", key)
+    mode = re.fullmatch(r"shape\.mode\.([1-9]\d*)\.amplitude", key)
+    return symbol(modulus[1]) if modulus else f"amplitude of mode {mode[1]}" if mode else NAMES.get(key, key)
+
+
+def with_sets(case, sets):
+    """{"energy.k20": 0.2, ...} of the text of a case with overrides "key=value"; a table of values replaces its key."""
+    flat = flatten(tomllib.loads(case))
+    for one in sets:
+        key, _, value = one.partition("=")
+        try:
+            flat |= flatten(tomllib.loads(f"x = {value}")["x"], key.strip())
+        except tomllib.TOMLDecodeError:  # a word without quotes
+            flat[key.strip()] = value.strip()
+    return flat
 
 
 class Axis:
@@ -88,8 +113,11 @@ class Axis:
 
     @property
     def label(self):
-        modulus = re.fullmatch(r"energy\.k(\d+)", self.key)
-        return formula(f"k_{{{modulus[1]}}}") if modulus else NAMES.get(self.key, self.key)
+        return name_of(self.key)
+
+    def at(self, places):
+        """Values at places of older files, which have integers, or the values themselves."""
+        return self.values[places] if places.dtype.kind in "iu" else places
 
     def place(self, value):
         """The place of a value on the axis, given as text; None if it has no such value."""
@@ -137,12 +165,26 @@ class Scan:
             self.points = {name: values(data) for name, data in file["points"].items()}
             self.names = list(file["points/outcome"].attrs["names"])
             self.title = file["scan"].attrs["title"]
+            self.case = with_sets(file["case"][()].decode(), file["case"].attrs["set"]) if "set" in file["case"].attrs else {}
             self.starts = file["scan"].attrs.get("start_axis")  # the axis of initial shapes of an equilibrium, or None
             self.boundary = values(file["boundary"])
             self.crossings = values(file["crossing"]).mean(axis=1) if "crossing" in file else []
             self.thresholds = [(line.attrs["label"], values(line["first"]), values(line["second"]), values(line["values"]))
                                for line in file["thresholds"].values()]  # fmt: skip
             self.equal = {name: values(data) for name, data in file["equal_energies"].items()} if self.starts is not None else {}
+
+    def caption(self):
+        """What all points have in common and the title need not say: moduli that are not zero, sizes, loads."""
+        varied = [key for axis in self.axes for key in axis.key.split(", ")]
+        shown = {key: value for key, value in self.case.items() if key not in varied and CAPTION.fullmatch(key)}
+        words = []
+        for key, value in sorted(shown.items(), key=lambda item: not item[0].startswith("energy.")):
+            name = symbol(key.split(".")[-1]) if key.startswith("energy.") else name_of(key)
+            if isinstance(value, str):
+                words.append(value)
+            elif value and not isinstance(value, (bool, list)):
+                words.append(f"{name} = {number(value)}")
+        return words
 
     def places(self, slices):
         """The place of its value for each axis that is cut: {axis number: place}."""
@@ -218,6 +260,7 @@ class Slice:
             self._boundary(scan, cut, kept)
         else:
             self.boundary = differing(self.points["outcome"])
+        self.caption = scan.caption()
         where = ", ".join(f"{scan.axes[i].key} = {scan.axes[i].texts[place]}" for i, place in sorted(cut.items()))
         self.title = ": ".join(words for words in (scan.title, where) if words)
 
@@ -319,7 +362,7 @@ def draw_cells(part, quantity, panel):
         shown, look = np.ma.masked_invalid(part.points[quantity]), {"cmap": "viridis"}
     mesh = panel.pcolormesh(*(axis.borders() for axis in part.axes), shown.T, rasterized=True, **look)
     if quantity != "outcome":
-        bar = panel.figure.add_axes([0.74, 0.11, 0.02, 0.8])
+        bar = panel.inset_axes([1.04, 0, 0.03, 1])
         panel.figure.colorbar(mesh, cax=bar, label=QUANTITIES[quantity])
 
 
@@ -328,7 +371,7 @@ def draw_map(part, quantity, panel):
     draw_cells(part, quantity, panel)
     handles = draw_borders(part, panel) + draw_hatches(part, panel)
     for dashes, (label, first, second, height) in zip(THRESHOLD_DASHES, part.thresholds):
-        panel.contour(axes[0].values[first], axes[1].values[second], height.T, [0], colors="#c0392b", linestyles=[dashes], linewidths=1.2)
+        panel.contour(axes[0].at(first), axes[1].at(second), height.T, [0], colors="#c0392b", linestyles=[dashes], linewidths=1.2)
         handles.append(Line2D([], [], color="#c0392b", linestyle=dashes, label=label))
     panel.set(xlabel=axes[0].label, ylabel=axes[1].label)
     if axes[1].logarithmic:
@@ -377,10 +420,15 @@ def figure_of(path, quantity="", slices=(), confirmed=None):
         raise BadInput(f"--quantity {quantity}: must be one of {', '.join(QUANTITIES)}")
     is_map = len(part.axes) == 2
     of_outcomes = not is_map or quantity in ("", "outcome")
-    figure = Figure(figsize=(style.WIDTH, HEIGHT))
-    panel, handles = figure.add_axes([0.09, 0.11, 0.62, 0.8]), []
+    patches = [
+        Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
+        for k, name in enumerate(part.names)
+        if of_outcomes and k > 0 and (count := int(((part.points["outcome"] == k) & ~part.vesiculated & ~part.unreached).sum()))
+    ]
     if confirmed and (not is_map or slices):
         raise BadInput(f"{path}: --confirmed marks points of a scan of two axes, without --slice")
+    figure = Figure(figsize=(style.WIDTH, PANEL))
+    panel, handles = figure.add_axes([0, 0, 1, 1]), []
     if is_map:
         handles = draw_map(part, quantity or "outcome", panel)
         handles += draw_confirmed(confirmed, part, panel) if confirmed else []
@@ -389,11 +437,13 @@ def figure_of(path, quantity="", slices=(), confirmed=None):
     if part.axes[0].logarithmic:
         panel.set_xscale("log")
     part.axes[0].mark(panel.xaxis)
-    panel.set_title(as_label(part.title))
-    patches = [
-        Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
-        for k, name in enumerate(part.names)
-        if of_outcomes and k > 0 and (count := int(((part.points["outcome"] == k) & ~part.vesiculated & ~part.unreached).sum()))
-    ]
-    figure.legend(handles=patches + handles, loc="upper left", bbox_to_anchor=(0.72 if of_outcomes else 0.84, 0.92))
+    legend = style.Legend(patches + handles)
+    captions = textwrap.wrap(", ".join(part.caption), int(style.WIDTH / 0.062))
+    right, low = max(legend.right + (0 if of_outcomes else BAR), 0.15), legend.below + BELOW
+    tall = low + PANEL + ABOVE + 0.13 * len(captions)
+    figure.set_size_inches(style.WIDTH, tall)
+    panel.set_position([LEFT / style.WIDTH, low / tall, 1 - (LEFT + right) / style.WIDTH, PANEL / tall])
+    figure.text(0.5, 1 - 0.05 / tall, as_label(part.title), ha="center", va="top", fontsize=8)
+    figure.text(0.5, (low + PANEL + 0.06) / tall, "\n".join(captions), ha="center", va="bottom", fontsize=6.5, color="0.25")
+    legend.draw(panel, 0.02)
     return figure

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from .labels import number
 from .results import BadInput
-from .style import DASHES, axes_at, legend_beside, line_colours, result_handles
+from .style import DASHES, Legend, axes_at, line_colours, result_handles
 
 HEIGHT, BALANCE_HEIGHT = 2.6, 1.7  # inches of the axes
 DECADES = 9  # the most of a balance that are shown below the largest value
@@ -28,7 +28,8 @@ class Choice:
     x: str = "time"
     low: float | None = None
     high: float | None = None
-    logarithmic: bool = False
+    logx: bool = False
+    logy: bool = False
 
     def of(self, result, name):
         """x and values of a result in the range; BadInput if there is nothing to draw."""
@@ -41,7 +42,11 @@ class Choice:
         inside = (x >= (-np.inf if self.low is None else self.low)) & (x <= (np.inf if self.high is None else self.high))
         if not inside.any():
             raise BadInput(f"{result.path}: no row has a {self.x} in the range; it goes from {number(x.min())} to {number(x.max())}")
-        if self.logarithmic:
+        if self.logx:
+            inside &= x > 0
+            if not inside.any():
+                raise BadInput(f"{result.path}: {self.x} is nowhere positive in the range, as --logx needs it")
+        if self.logy:
             y = np.where(y > 0, y, np.nan)  # a gap
             if not np.isfinite(y[inside]).any():
                 raise BadInput(f"{result.path}: {name} is nowhere positive in the range, as --logy needs it")
@@ -54,29 +59,30 @@ class SeriesPanel:
     def __init__(self, results, labels, choice):
         self.labels, self.choice, self.meanings = labels, choice, meanings(results)
         self.lines = [[choice.of(result, name) for name in choice.names] for result in results]
-        self.height = HEIGHT + 0.62
+        names, dashes = choice.names, ("-", *DASHES * len(choice.names))
+        handles = result_handles(labels)
+        if len(names) > 1:
+            handles += [Line2D([], [], color="0.3", linestyle=d, label=self._name(n)) for n, d in zip(names, dashes)]
+        self.legend = Legend(handles)
+        self.height = HEIGHT + 0.62 + self.legend.below
 
     def _name(self, name):
         return "time t" if name == "time" else self.meanings.get(name, name)
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        names = self.choice.names
-        dashes = ("-", *DASHES * len(names))
-        handles = result_handles(self.labels)
-        if len(names) > 1:
-            handles += [Line2D([], [], color="0.3", linestyle=d, label=self._name(n)) for n, d in zip(names, dashes)]
-        beside = 0.5 + 0.06 * max((len(handle.get_label()) for handle in handles), default=-8)
-        axes = axes_at(figure, 0.75, bottom + 0.4, figure.get_figwidth() - 0.9 - beside, HEIGHT)
+        names, dashes = self.choice.names, ("-", *DASHES * len(self.choice.names))
+        axes = axes_at(figure, 0.75, bottom + self.legend.below + 0.4, figure.get_figwidth() - 0.9 - self.legend.right, HEIGHT)
         for lines, colour in zip(self.lines, line_colours(len(self.lines))):
             for (x, y), style in zip(lines, dashes):
                 axes.plot(x, y, color=colour, linestyle=style, marker="o" if x.size == 1 else "")
-        if self.choice.logarithmic:
+        if self.choice.logx:
+            axes.set_xscale("log")
+        if self.choice.logy:
             axes.set_yscale("log")
         axes.margins(x=0)
         axes.set(xlabel=self._name(self.choice.x), ylabel=self._name(names[0]) if len(names) == 1 else "")
-        if handles:
-            legend_beside(axes, handles)
+        self.legend.draw(axes, bottom)
 
 
 def has_balance(result):
@@ -104,11 +110,14 @@ class BalancePanel:
         self.results, self.labels, self.times = results, labels, times
         present = [name for name in BALANCE if any(magnitude(result, name) for result in results)]
         self.styles = dict(zip(present, ("-", *DASHES)))
-        self.height = BALANCE_HEIGHT + 0.55
+        shade, names = line_colours(1)[0] if len(results) == 1 else "0.3", meanings(results)
+        lines = [Line2D([], [], color=shade, linestyle=dashes, label=names[name].split(", ")[0]) for name, dashes in self.styles.items()]
+        self.legend = Legend(result_handles(labels) + lines)
+        self.height = BALANCE_HEIGHT + 0.55 + self.legend.below
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        axes = axes_at(figure, 0.5, bottom + 0.38, figure.get_figwidth() - 2.45, BALANCE_HEIGHT)
+        axes = axes_at(figure, 0.5, bottom + self.legend.below + 0.38, figure.get_figwidth() - 0.6 - (self.legend.right or 0.1), BALANCE_HEIGHT)
         axes.set(xscale="log", yscale="log", xlabel="time t")
         largest = 0.0
         for result, colour in zip(self.results, line_colours(len(self.results))):
@@ -123,6 +132,4 @@ class BalancePanel:
         if largest:
             low, high = axes.get_ylim()
             axes.set_ylim(max(low, largest * 10.0**-DECADES), high)
-        shade, names = line_colours(1)[0] if len(times) == 1 else "0.3", meanings(self.results)
-        lines = [Line2D([], [], color=shade, linestyle=dashes, label=names[name].split(", ")[0]) for name, dashes in self.styles.items()]
-        legend_beside(axes, result_handles(self.labels) + lines, labelspacing=0.45)
+        self.legend.draw(axes, bottom)

@@ -5,12 +5,14 @@ from contextlib import contextmanager
 
 import matplotlib.pyplot as plt
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from .labels import formula, number
 from .results import BadInput
 
-WIDTH = 7.0  # inches: the text width of a two-column page
-DPI = 300  # of PNG, and of pictures within SVG and PDF; see resolution()
+WIDTH = 7.0  # inches: the text width of a two-column page; see page()
+NARROW = 5.0  # inches: below, legends and colour bars stand below each other
+DPI = 300  # of PNG, and of pictures within SVG and PDF; see page()
 DPI_RANGE = 30, 1200
 FORMATS = (".png", ".svg", ".pdf")
 MARKERS = "os^Dv<>p"
@@ -47,16 +49,62 @@ def apply():
 
 
 @contextmanager
-def resolution(dpi):
-    """Draws and writes with this DPI meanwhile."""
-    global DPI
+def page(dpi, width=WIDTH):
+    """Draws and writes with this DPI and WIDTH meanwhile."""
+    global DPI, WIDTH
     if not DPI_RANGE[0] <= dpi <= DPI_RANGE[1]:
         raise BadInput(f"--dpi: {number(dpi)} is not between {DPI_RANGE[0]} and {DPI_RANGE[1]} pixels per inch")
-    before, DPI = DPI, dpi
+    before, DPI, WIDTH = (DPI, WIDTH), dpi, width
     try:
         yield
     finally:
-        DPI = before
+        DPI, WIDTH = before
+
+
+def is_narrow():
+    return WIDTH < NARROW
+
+
+def slots(count):
+    """Where this many colour bars stand: left end and width as parts of the page, and their line, 0 at the bottom."""
+    if is_narrow():
+        return [(0.1, 0.8, count - 1 - i) for i in range(count)]
+    known = {1: ((0.29, 0.42),), 2: ((0.12, 0.34), (0.56, 0.34))}.get(count)
+    return [(*slot, 0) for slot in known or [(0.05 + 0.95 * i / count, 0.95 / count - 0.06) for i in range(count)]]
+
+
+class Legend:
+    """Beside axes, or on a narrow page below them. `right` and `below` are the inches that it needs there."""
+
+    SIZE, LINE = 0.06, 0.155  # inches: of a letter, of a line
+
+    def __init__(self, handles, title=None):
+        self.handles, self.title = handles, title
+        texts = [handle.get_label() for handle in handles]
+        widest = max((len(line) for text in texts for line in text.split("\n")), default=0)
+        self.columns = max(1, int(WIDTH / (0.6 + self.SIZE * widest))) if is_narrow() else 1
+        self.right = 0.0 if is_narrow() or not handles else 0.5 + self.SIZE * widest
+        lines = max((text.count("\n") + 1 for text in texts), default=1) * -(-len(texts) // self.columns) + bool(title)
+        self.below = self.LINE * lines + 0.1 if is_narrow() and handles else 0.0
+
+    def draw(self, axes, bottom):
+        """`bottom`: inches above the figure's edge of the room below."""
+        if not self.handles:
+            return
+        options = {"handles": self.handles, "title": self.title, "title_fontsize": 7, "borderaxespad": 0, "labelspacing": 0.4}
+        if not is_narrow():
+            axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), **options)
+            return
+        figure = axes.figure
+        place = 0.5, (bottom + self.below) / figure.get_figheight()
+        axes.legend(loc="upper center", bbox_to_anchor=place, bbox_transform=figure.transFigure, ncols=self.columns,
+                    columnspacing=1.0, **options)  # fmt: skip
+
+
+def few_ticks(axis, inches, least=0.5):
+    """Round numbers, at least so many inches apart."""
+    axis.set_major_locator(MaxNLocator(max(1, min(5, int(inches / least))), steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
 
 
 def line_colours(n):
@@ -69,10 +117,6 @@ def axes_at(figure, left, bottom, width, height, **options):
     """Axes at a place of the page in inches."""
     wide, tall = figure.get_size_inches()
     return figure.add_axes([left / wide, bottom / tall, width / wide, height / tall], **options)
-
-
-def legend_beside(axes, handles, **options):
-    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0, **options)
 
 
 def result_handles(labels):
@@ -90,7 +134,7 @@ def time_text(time):
 
 
 def time_title(index, time):
-    """The words above the shapes at this time; None: above the last ones."""
+    """The words above the shapes at this time; None: above the last ones, each at its own time."""
     return "last state" if time is None else f"{time_name(index)} = {time_text(time)}"
 
 

@@ -1,25 +1,20 @@
-"""Panel of curved surfaces, coloured by normal velocity (with arrows for the flow along the surface), H, K, pressure or modes.
-With one time the quantities are side by side; else there is one column per time, with the quantities above each other."""
+"""Panel of curved surfaces, coloured by H, K, normal velocity (with arrows for the flow along the surface), pressure, H0,
+energy density or modes. One shape has the quantities side by side; of several results with one shape each, the results are
+side by side; else there is one column per time. Quantities are then above each other."""
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from . import flow, raster, style
-from .colours import Colours, curvature_colours, draw_bar, pressure_colours
-from .results import BadInput
-from .style import WIDTH
-from .tubes import ShapesPanel
+from .colours import BAR_HEIGHT, SYMBOLS, Colours, colours_of, draw_bar
+from .labels import wrapped
+from .tubes import Column, ShapesPanel, check_quantities
 
 RIM = 0.02  # inches around each surface
-SLOTS = {1: ((0.29, 0.42),), 2: ((0.12, 0.34), (0.56, 0.34))}  # left end and width of colour bars, parts of the page
-
-
-def slots(count):
-    """Height for this many colour bars side by side."""
-    return SLOTS.get(count) or tuple((0.05 + 0.95 * i / count, 0.95 / count - 0.06) for i in range(count))
 
 
 def node_areas(surface):
@@ -30,13 +25,10 @@ def node_areas(surface):
 
 
 def choose_colours(results, wanted):
-    """Names of the quantities to colour by: the requested ones, else the normal velocity of moving surfaces, else H and K."""
+    """Names of the quantities to colour by: the requested ones, else H of moving surfaces, H and K of others."""
     if not wanted:
-        return ["u_n"] if all(result.moves for result in results) else ["H", "K"]
-    for name in wanted:
-        for result in results:
-            if any(surface.quantity(name) is None for surface in result.surfaces):
-                raise BadInput(f"{result.path}: not all of its frames have {name}")
+        return ["H"] if all(result.moves for result in results) else ["H", "K"]
+    check_quantities(results, attrgetter("surfaces"), wanted)
     return list(dict.fromkeys(wanted))
 
 
@@ -58,19 +50,19 @@ class Quantity:
 def quantities(names, results, surfaces):
     """Scales of colours that all surfaces share; of the normal velocity relative to its largest value on each."""
     areas = [node_areas(surface).ravel() for surface in surfaces]
-    u_n = flow.SYMBOLS["u_n"]
-    label = f"normal velocity {u_n} / max |{u_n}| of the shape, > 0: outward"
-    found = {"u_n": Quantity("u_n", u_n, Colours(flow.VELOCITY, Normalize(-1, 1), "neither", label))}
-    for name, colours in zip("HK", curvature_colours(results, surfaces, areas)):
-        colours.label = colours.label.format("")
-        found[name] = Quantity(name, name, colours)
-    if "p" in names:
-        found["p"] = Quantity("p", "p", pressure_colours([surface.p.ravel() for surface in surfaces], areas))
+    found = []
     for name in names:
-        if name.startswith("mode_"):
+        if name == "u_n":
+            u_n = SYMBOLS[name]
+            label = f"normal velocity {u_n} / max |{u_n}| of the shape, > 0: outward"
+            colours = Colours(flow.VELOCITY, Normalize(-1, 1), "neither", label)
+        elif name.startswith("mode_"):
             number = name.removeprefix("mode_")
-            found[name] = Quantity(name, f"mode {number}", Colours(flow.VELOCITY, Normalize(-1, 1), "neither", f"normal displacement of mode {number}"))
-    return [found[name] for name in names]
+            colours = Colours(flow.VELOCITY, Normalize(-1, 1), "neither", f"normal displacement of mode {number}")
+        else:
+            colours = colours_of(name, results, surfaces, areas)
+        found.append(Quantity(name, SYMBOLS.get(name, name.replace("_", " ")), colours))
+    return found
 
 
 class SurfacePanel(ShapesPanel):
@@ -78,29 +70,38 @@ class SurfacePanel(ShapesPanel):
     MAX_LENGTH = MAX_WIDTH = 2.7
     BAR = 1 / 3
 
-    def __init__(self, results, labels, columns, names):
-        self.view = raster.View()
+    def __init__(self, results, labels, columns, names, camera=raster.CAMERA):
+        self.view = raster.View(*camera)
         shown = [(row, surface) for column in columns for row, surface in enumerate(column.cells) if surface]
         self.quantities = quantities(names, results, [surface for _, surface in shown])
-        self.motions = [flow.Motion(result.surfaces) for result in results]
+        motions = [flow.Motion(result.surfaces) for result in results]
+        self.motions = {id(surface): motions[row] for row, surface in shown}
         self.velocity = "u_n" in names
-        self.arrows = self.velocity and any(self.motions[row].largest("u_t", surface) for row, surface in shown)
+        self.arrows = self.velocity and any(motions[row].largest("u_t", surface) for row, surface in shown)
+        self.names_of_columns = None
+        if len(columns) == 1 and len(results) > 1:
+            (column,) = columns
+            self.names_of_columns = [wrapped(label, self.LABEL_WIDTH) for label in labels]
+            columns = [Column(column.time, [cell], [stop]) for cell, stop in zip(column.cells, column.stops)]
+            results, labels = results[:1], [""]
         self.beside = len(columns) == 1  # H beside K, not above
         self.pictures, self.copies = (1, len(names)) if self.beside else (len(names), 1)
         super().__init__(results, labels, columns)
-        if self.lone and self.beside:  # above their colour bars
-            self.centres = WIDTH * np.array([left + width / 2 for left, width in slots(len(names))])
+        if self.beside and not style.is_narrow():  # above their colour bars
+            self.centres = style.WIDTH * np.array([left + width / 2 for left, width, _ in style.slots(len(names))])
 
     def _size(self, surface):
         low, high = self.view.extent(surface.points.reshape(-1, 3))
         return high - low
 
     def _title(self, index, column):
+        if self.names_of_columns:
+            return self.names_of_columns[index]
         return "" if self.beside and not column.time else super()._title(index, column)  # only the time zero: a shape without a time
 
     def scale_by_run(self):
         """Velocities are relative to the largest ones of their run, so that shapes can be compared over time."""
-        for motion in self.motions:
+        for motion in self.motions.values():
             motion.by_run = True
         for quantity in self.quantities:
             quantity.colours.label = quantity.colours.label.replace("of the shape", "of the run")
@@ -108,7 +109,7 @@ class SurfacePanel(ShapesPanel):
     def _words(self, column, row):
         """Below the pictures of that row and column."""
         surface = column.cells[row]
-        moving = [self.motions[row].words(surface)] if self.velocity and surface else []
+        moving = [self.motions[id(surface)].words(surface)] if self.velocity and surface else []
         return "\n".join(words for words in (super()._words(column, row), *moving) if words)
 
     def draw(self, figure, bottom):
@@ -119,13 +120,13 @@ class SurfacePanel(ShapesPanel):
             for middle, quantity in zip(self.middles, self.quantities * len(self.labels)):
                 axes.text(left, bottom + self.height - middle, quantity.symbol, ha="right", va="center", style="italic")
 
-    def _samples(self, surface, row):
+    def _samples(self, surface):
         """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
         per_pixel = self.scale * style.DPI  # pixels per unit of length
         low, high = self.view.extent(surface.points.reshape(-1, 3))
         wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in high - low)
         rim = (np.array([wide, tall]) / per_pixel - (high - low)) / 2
-        fields = [quantity.at_nodes(surface, self.motions[row])[..., None] for quantity in self.quantities]
+        fields = [quantity.at_nodes(surface, self.motions[id(surface)])[..., None] for quantity in self.quantities]
         if self.arrows:
             fields.append(surface.u @ self.view.axes)
         return raster.sample(
@@ -135,7 +136,7 @@ class SurfacePanel(ShapesPanel):
         )  # fmt: skip
 
     def _draw_shape(self, axes, surface, row, places):
-        samples, motion = self._samples(surface, row), self.motions[row]
+        samples, motion = self._samples(surface), self.motions[id(surface)]
         there = np.isfinite(samples.depth)
         tall, wide = (extent // raster.OVERSAMPLING for extent in samples.shape)
         for picture, ((x, y), quantity) in enumerate(zip(places, self.quantities)):
@@ -150,15 +151,19 @@ class SurfacePanel(ShapesPanel):
                 flow.draw_surface_arrows(axes, samples, velocity, u_t, left, low + tall / style.DPI, per_inch)
         axes.set(xlim=(0, axes.figure.get_figwidth()), ylim=(0, axes.figure.get_figheight()))  # imshow changes them
 
+    def bars(self):
+        return len(self.quantities) + self.arrows
+
     def draw_colour_bars(self, figure, bottom):
-        """A colour bar for each quantity, and what the arrows mean, in the 0.5 inches above `bottom`."""
-        room = slots(len(self.quantities) + self.arrows)
-        for (left, width), quantity in zip(room, self.quantities):
+        """A colour bar for each quantity, and what the arrows mean."""
+        room = style.slots(self.bars())
+        for (left, width, line), quantity in zip(room, self.quantities):
             colours = quantity.colours
-            label = colours.label if len(room) < 3 or quantity.name == "p" else colours.label.split(" / ")[0]
-            mappable = ScalarMappable(colours.norm, colours.map)
-            draw_bar(figure, bottom, left, width, mappable, label, colours.extend)
+            label = colours.label.split(" / ")[0] if len(room) > 2 and quantity.name == "u_n" else colours.label
+            draw_bar(figure, bottom + line * BAR_HEIGHT, left, width, ScalarMappable(colours.norm, colours.map), label, colours.extend)
         if self.arrows:
+            left, _, line = room[-1]
             u_t = flow.SYMBOLS["u_t"]
-            words = f"{u_t} along the surface; this\nlong: max |{u_t}| of the {'run' if self.motions[0].by_run else 'shape'}"
-            flow.draw_arrow_key(figure, room[-1][0], bottom, words)
+            by_run = next(iter(self.motions.values())).by_run
+            words = f"{u_t} along the surface; this\nlong: max |{u_t}| of the {'run' if by_run else 'shape'}"
+            flow.draw_arrow_key(figure, left, bottom + line * BAR_HEIGHT, words)

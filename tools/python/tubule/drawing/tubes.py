@@ -1,4 +1,5 @@
-"""Panels of shapes: which frames they show, and their layout. Panel of tubes r(z): left halves coloured by H, right by K."""
+"""Panels of shapes: which frames they show, and their layout. Panel of tubes r(z): left halves coloured by H,
+right ones by K, unless others are asked for."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -6,12 +7,15 @@ from operator import attrgetter
 import numpy as np
 from matplotlib.collections import QuadMesh
 
-from .colours import curvature_colours, draw_bars
+from . import style
+from .colours import colours_of, draw_bars
 from .labels import number, wrapped
 from .results import BadInput
-from .style import WIDTH, draw_scale_bar, time_text, time_title
+from .raster import shade
+from .style import draw_scale_bar, time_text, time_title
 
-MAX_COLUMNS = 6
+MAX_COLUMNS, MAX_COLUMNS_NARROW = 6, 3
+LEAST_SPREAD = 0.25  # part of the spread of frames over their numbers, the rest is over changes of the energy
 MAX_HEIGHT = 5.6  # inches of all rows together
 MAX_TUBE_WIDTH = 1.5  # inches
 ROW_GAP, HEADER = 0.14, 0.24
@@ -31,8 +35,31 @@ def same_time(a, b, span):
     return abs(a - b) <= 1e-6 * abs(b) + 1e-12 * span
 
 
+def check_quantities(results, frames_of, names):
+    """Raises BadInput if frames lack one of these."""
+    for name in names:
+        for result in results:
+            if any(frame.quantity(name) is None for frame in frames_of(result)):
+                why = ", which those have where it varies" if name == "H0" else ""
+                raise BadInput(f"{result.path}: not all of its frames have {name}{why}")
+
+
+def spread_over_change(times, results, count):
+    """Numbers of so many of the times, the first and the last among them, between which the energies change about equally."""
+    place = LEAST_SPREAD * np.linspace(0, 1, len(times))
+    for result in results:
+        if result.has_energy(2):
+            change = np.concatenate([[0], np.cumsum(np.abs(np.diff(result.series["energy"])))])
+            place = place + np.interp(times, result.series["time"], change) / (change[-1] or 1.0) / len(results)
+    picks = {0, len(times) - 1}
+    while len(picks) < count:  # the one that is farthest from those chosen
+        picks.add(int(np.abs(place[:, None] - place[list(picks)]).min(axis=1).argmax()))
+    return sorted(picks)
+
+
 def choose_columns(results, times=None, frames_of=attrgetter("frames")):
-    """Columns of frames at the wanted times, else at up to six of the available times, evenly spaced by index.
+    """Columns of frames at the wanted times (infinity: the last ones), else at up to six of the available times, between which
+    the energies change equally.
 
     Times that all results have go before others. Of several results, the last frame of one that did not get
     to its end is no common time: it stands, with the reason, in the first later column.
@@ -55,27 +82,31 @@ def choose_columns(results, times=None, frames_of=attrgetter("frames")):
     shared = [time for time in candidates if all(has(result, time) for result in results)]
     if len(shared) > 2:
         candidates = shared
-    if times:
+    with_end = times is not None and np.inf in times
+    times = [time for time in times or [] if time < np.inf]
+    if times or with_end:
         available = sorted({f.time for r in results for f in frames_of(r)})
         for time in times:
             if not any(same_time(time, other, span) for other in available):
                 known = ", ".join(time_text(t) for t in available[:12]) + (", ..." if len(available) > 12 else "")
                 raise BadInput(f"--times: no result has a frame at t = {number(time)}; there are frames at {known}")
         candidates = sorted(set(times))
-    elif len(candidates) > MAX_COLUMNS:
-        picks = np.linspace(0, len(candidates) - 1, MAX_COLUMNS).round().astype(int)
-        candidates = [candidates[i] for i in picks]
+    elif len(candidates) > (most := MAX_COLUMNS_NARROW if style.is_narrow() else MAX_COLUMNS):
+        candidates = [candidates[i] for i in spread_over_change(candidates, results, most)]
 
     columns = [Column(time, [None] * len(results), [None] * len(results)) for time in candidates]
     last = Column(None, [None] * len(results), [None] * len(results))
     for row, result in enumerate(results):
         for frame in frames_of(result):
             column = next((c for c in columns if same_time(frame.time, c.time, span)), None)
-            if column is None and is_stop(result, frame) and not times:
+            if column is None and is_stop(result, frame) and not times and not with_end:
                 column = next((c for c in columns if c.time > frame.time), last)
             if column:
                 column.cells[row] = frame
                 column.stops[row] = result.stopped_early if is_stop(result, frame) else None
+        if with_end:
+            end = frames_of(result)[-1:]
+            last.cells[row], last.stops[row] = (end or [None])[0], result.stopped_early if end else None
     return columns + ([last] if any(last.cells) else [])
 
 
@@ -84,7 +115,7 @@ def caption(column, row, numbered=False):
     frames have numbers in place of times."""
     stop, frame = column.stops[row], column.cells[row]
     if not stop:
-        return ""
+        return f"t = {time_text(frame.time)}" if frame and column.time is None and not numbered else ""
     shown = column.time is not None and same_time(frame.time, column.time, frame.time)
     return stop if shown or numbered else f"{stop}\nt = {time_text(frame.time)}"
 
@@ -109,7 +140,7 @@ class ShapesPanel:
         self.lone = len(results) == 1  # its label is the title of the picture
         self.labels = [""] if self.lone else [wrapped(label, self.LABEL_WIDTH) for label in labels]
         self.shapes = [shape for column in columns for shape in column.cells if shape]
-        self.left = 0.2 + 0.062 * max(len(line) for label in self.labels for line in label.split("\n"))
+        self.left = (0.45 if self.pictures > 1 else 0.2) + 0.062 * max(len(line) for label in self.labels for line in label.split("\n"))
         self.titles = [self._title(index, column) for index, column in enumerate(columns)]
         self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
         below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
@@ -117,7 +148,7 @@ class ShapesPanel:
         sizes = np.array([[self._size(shape) if shape else (0, 0) for shape in column.cells] for column in columns])
         widths, self.lengths = np.repeat(sizes[..., 0].max(axis=1), self.copies), sizes[..., 1].max(axis=0)
         gap = self.COLUMN_GAP + 2 * self.MARGIN
-        room_x = WIDTH - self.left - SCALE_BAR - 0.1 - gap * len(widths)
+        room_x = style.WIDTH - self.left - SCALE_BAR - 0.1 - gap * len(widths)
         room_y = MAX_HEIGHT - sum(below) - self.pictures * (ROW_GAP + 2 * self.MARGIN) * len(results)
         self.scale = min(
             room_x / sum(widths),
@@ -137,7 +168,7 @@ class ShapesPanel:
         self.centres = self.left + np.cumsum(pitch + slack) - pitch / 2 - slack / 2
         if self.lone:
             occupied = self.centres[0] - self.widths[0] / 2, self.centres[-1] + self.widths[-1] / 2
-            self.centres += (WIDTH - SCALE_BAR - sum(occupied)) / 2
+            self.centres += max(style.WIDTH - SCALE_BAR - sum(occupied), 2 * (self.left - occupied[0])) / 2
         else:  # in the middle of what is right of the labels
             self.centres += (spare - slack * len(pitch)) / 2
 
@@ -185,25 +216,39 @@ class ShapesPanel:
 
 
 class ProfilePanel(ShapesPanel):
-    """Profiles, coloured by H on the left and K on the right."""
+    """Profiles, coloured by a quantity on the left and another or the same on the right."""
 
-    def __init__(self, results, labels, columns):
+    def __init__(self, results, labels, columns, names):
         super().__init__(results, labels, columns)
+        self.names = names[:2]
+        if len(names) > 2:
+            raise BadInput("--colour: a profile has two halves, and at most as many colours")
         self._choose_colours()
 
     def _size(self, frame):
         return 2 * frame.r.max(), frame.length
 
     def _choose_colours(self):
-        self.H, self.K = curvature_colours(self.results, self.shapes, [ring_areas(frame) for frame in self.shapes])
+        areas = [ring_areas(frame) for frame in self.shapes]
+        self.colours = [colours_of(name, self.results, self.shapes, areas) for name in self.names]
+
+    def _halves(self, frame):
+        """Side, values and colours of the left and the right half."""
+        return [(side, frame.quantity(self.names[k]), self.colours[k]) for side, k in ((-1, 0), (1, -1))]
 
     def _draw_axis(self, axes, frame, x, y):
         reach = 0.5 * self.scale * frame.length + max(0.05, self.MARGIN)
         axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
 
+    def bars(self):
+        return len(self.names)
+
     def draw_colour_bars(self, figure, bottom):
-        """Two colour bars in the 0.5 inches above `bottom`."""
-        draw_bars(figure, bottom, self.H, self.K, " (left halves)", " (right halves)")
+        """A colour bar for each half."""
+        halves = (" (left halves)", " (right halves)") if len(self.names) > 1 else ("",)
+        # The name, where it is drawn, what is white.
+        labels = ["".join([*words.partition(",")[:1], half, *words.partition(",")[1:]]) for words, half in zip((c.label for c in self.colours), halves)]
+        draw_bars(figure, bottom, list(zip(self.colours, labels)))
 
 
 class TubePanel(ProfilePanel):
@@ -219,15 +264,14 @@ class TubePanel(ProfilePanel):
 
         r = self.scale * sampled(frame.r)
         z = self.scale * sampled(frame.z - (frame.z.min() + frame.z.max()) / 2) + y
-        # Strips of equal angle around the axis; the light comes from the viewer, from slightly above.
+        # Strips of equal angle around the axis.
         s = np.sin(np.linspace(0, np.pi / 2, STRIPS + 1))
         middle = (s[1:] + s[:-1]) / 2
-        slope = 0.6 * np.arctan2(np.diff(r), np.diff(z))[:, None]  # softened, because necks would become black
-        lit = np.cos(slope) * np.sqrt(1 - middle**2) * 0.94 - np.sin(slope) * 0.34
-        shade = (0.85 + 0.15 * np.clip(lit, 0, 1))[..., None]
-        for side, values, colours in ((-1, frame.H, self.H), (1, frame.K, self.K)):
+        towards_eye = np.cos(np.arctan2(np.diff(r), np.diff(z)))[:, None] * np.sqrt(1 - middle**2)
+        dim = shade(towards_eye)[..., None]
+        for side, values, colours in self._halves(frame):
             values = sampled(values)
-            rgb = colours.rgb((values[1:] + values[:-1]) / 2)[:, None] * shade
+            rgb = colours.rgb((values[1:] + values[:-1]) / 2)[:, None] * dim
             corners = np.stack([x + side * r[:, None] * s, np.broadcast_to(z[:, None], (z.size, s.size))], axis=-1)
             mesh = QuadMesh(corners, antialiased=False, rasterized=True, linewidth=0, zorder=1)
             mesh.set_facecolor(rgb.reshape(-1, 3))
