@@ -93,7 +93,9 @@ Handle make_image(std::size_t step) {
     const auto access = property_list(H5P_FILE_ACCESS);
     H5Pset_fapl_core(access, step, false);
     const char* name = "image of a tubule result";  // appears nowhere
-    return {H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "make", name};
+    Handle image(H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "make", name);
+    put_attribute(image, "schema", schema);
+    return image;
 }
 
 std::vector<std::byte> bytes_of(hid_t image) {
@@ -206,6 +208,15 @@ void require_all_values(hid_t file) {
     }
 }
 
+// Results of version 0.1 have none.
+void require_schema(hid_t file) {
+    if (H5Aexists(file, "schema") <= 0) return;
+    const auto found = get_attribute<std::int64_t>(open_attribute(file, "schema"), H5T_NATIVE_INT64, "schema");
+    if (found > schema)
+        throw std::runtime_error(fmt::format(
+            "was written by a later version of tubule, with schema {}; this version reads 1 to {}", found, schema));
+}
+
 }  // namespace
 
 Handle open_file(const std::filesystem::path& file) {
@@ -232,6 +243,7 @@ Handle open_file(const std::filesystem::path& file) {
         if (::stat(file.c_str(), &named) != 0 || named.st_ino != checked.st_ino || named.st_dev != checked.st_dev)
             continue;
         if (!has_checksums) require_all_values(opened);
+        require_schema(opened);
         return opened;
     }
 }

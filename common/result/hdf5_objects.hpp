@@ -60,6 +60,9 @@ Handle space(const std::vector<std::size_t>& shape);
 
 // ---- writing
 
+// Which layout a file has, as an attribute: raised when a program that reads the former one would misread it.
+constexpr std::int64_t schema = 2;
+
 // A file in memory, growing in steps of `step` bytes, and its bytes in the end.
 Handle make_image(std::size_t step);
 std::vector<std::byte> bytes_of(hid_t image);
@@ -82,8 +85,8 @@ void put_inputs(hid_t file, const CaseInputs& inputs);
 
 // ---- reading
 
-// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged, or if another
-// program has made it such that values are not in it.
+// Opens a file whose checksums are right (checksums.hpp), or that has none. Throws if it is damaged, if another
+// program has made it such that values are not in it, or if its schema is a later one.
 Handle open_file(const std::filesystem::path& file);
 
 bool has(hid_t parent, const std::string& name);

@@ -71,7 +71,8 @@ class Calls:
             (self.result.frames.__getitem__, dict(number=0)),
             (self.result.series.__getitem__, dict(name="energy")),
             (frame.profile, dict(points=5)),
-            (frame.revolve, dict(around=5, points=4)),
+            (frame.triangles, dict(subdivide=2)),
+            (tubule.export, dict(what=self.result, output="new.stl", frame=0, subdivide=1)),
         ]
 
     def random(self, rng):

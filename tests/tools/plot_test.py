@@ -504,6 +504,9 @@ class Refusals(InFolder):
         with h5py.File(self.folder / "other.hdf", "w") as file:
             file["x"] = 1
         self.refused("other.hdf: is not a result of tubule (it has no /case)", self.folder / "other.hdf")
+        with h5py.File(self.folder / "other.hdf", "a") as file:
+            file.attrs["schema"] = 3
+        self.refused("a later version of tubule, with schema 3; this version reads 1 to 2", self.folder / "other.hdf")
 
     def test_damaged_records(self):
         for changes, words in (

@@ -316,6 +316,8 @@ TEST_F(ResultFile, ADamagedSurfaceNamesItsLack) {
         fs::remove(file);
         return message;
     };
+    EXPECT_CONTAINS(damaged("f.attrs['schema'] += 1"),
+                    "later version of tubule, with schema 3; this version reads 1 to 2");
     EXPECT_CONTAINS(damaged("del f['meshes']"), "000000 refers to mesh 0, which is missing");
     EXPECT_CONTAINS(damaged("del f['meshes/000000/point_shift']"), "point_shift");
     EXPECT_CONTAINS(damaged("f['meshes/000000/Connectivity'][0] = 99"),

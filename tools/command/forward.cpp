@@ -1,4 +1,5 @@
-// tubule plot, view, chart: the scripts of tools/python/tubule/drawing read their arguments, which pass through unread.
+// tubule plot, view, export, chart: the scripts of tools/python/tubule/drawing read their arguments, which pass through
+// unread.
 #include "tools/command/forward.hpp"
 
 #include <CLI/CLI.hpp>
@@ -26,7 +27,7 @@ void refuse_damaged(const std::vector<std::string>& words) {
 }  // namespace
 
 bool is_forwarded(std::string_view command) {
-    return command == "plot" || command == "view" || command == "chart";
+    return command == "plot" || command == "view" || command == "export" || command == "chart";
 }
 
 int forward(const std::string& command, const std::vector<std::string>& words) {
@@ -50,6 +51,10 @@ void add_plot(CLI::App& app, int&) {
 void add_view(CLI::App& app, int&) {
     app.add_subcommand(
         "view", "Write one HTML page with the shapes of a result, to turn in a browser, or with the map of a scan");
+}
+
+void add_export(CLI::App& app, int&) {
+    app.add_subcommand("export", "Write a shape of a result as flat triangles: STL, PLY or OBJ");
 }
 
 void add_chart(CLI::App& app, int&) {

@@ -111,7 +111,7 @@ def one(rng, box):
         return "no such line"
     statuses = (0, 1, 2, 3, 4, 5)
     # Python shows where it was when it is interrupted while it starts.
-    signals = rng.random() < 0.3 and name not in ("plot", "view", "chart") and "--plot" not in arguments
+    signals = rng.random() < 0.3 and name not in ("plot", "view", "export", "chart") and "--plot" not in arguments
     if signals:
         statuses += disturbed(rng, box, process)
     done = box.judged(process, (name, *arguments), statuses=statuses, limit=10 if signals else 60)

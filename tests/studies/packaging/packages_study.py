@@ -44,7 +44,7 @@ class Unpacked(unittest.TestCase):
 
     def libraries(self):
         """The baseline, then the variants."""
-        return [self.root / LIB / "libtubule.so.0.1", *sorted((self.root / LIB / "glibc-hwcaps").glob("*/libtubule.so.0.1"))]
+        return [self.root / LIB / "libtubule.so.0.2", *sorted((self.root / LIB / "glibc-hwcaps").glob("*/libtubule.so.0.2"))]
 
     def test_variants_export_the_same_and_only_what_is_ours(self):
         names = [set(run("nm", "-DC", "--defined-only", "--format=just-symbols", path).split("\n")) for path in self.libraries()]

@@ -15,10 +15,10 @@ Keys of cases: docs/case_files.md. Series: docs/results.md. All numbers are dime
 from . import compiled  # noqa: F401  first: it says what to do where the compiled part is missing
 from ._core import CaseError, SolveError, build_info as _build_info
 from .cases import Case
-from .commands import Scan, compare, curvatures, energy_density, equilibrium, run, run_many, scan, stability
-from .pictures import draw
+from .commands import Scan, compare, curvatures, energy_density, equilibrium, export, run, run_many, scan, stability
+from .pictures import draw, film
 from .results import Frame, Result, read
 
 __version__ = dict(_build_info())["version"]
 __all__ = ["Case", "CaseError", "Frame", "Result", "Scan", "SolveError", "compare", "curvatures", "draw",
-           "energy_density", "equilibrium", "read", "run", "run_many", "scan", "stability"]
+           "energy_density", "equilibrium", "export", "film", "read", "run", "run_many", "scan", "stability"]

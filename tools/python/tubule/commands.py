@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import operator
 import os
@@ -16,7 +17,7 @@ import numpy as np
 
 from . import _core
 from .cases import Case, as_case, as_mapping, file_name, toml_value
-from .results import Result, read
+from .results import Frame, Result, read
 
 Progress = Callable[[float, float, float], None]
 
@@ -173,13 +174,29 @@ class Scan:
     def measures(self) -> list[str]:
         return list(self._measures)
 
+    def __repr__(self) -> str:
+        found = ", ".join(f"{n} {name}" for name, n in zip(*np.unique(self.outcome, return_counts=True)))
+        return f"<tubule.Scan over {' x '.join(map(str, self.keys))}: {found}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: a table of the points, at most a hundred."""
+        columns = self._columns(["outcome", "energy", "energy_error", "time"])
+        rows = [[f"<th>{html.escape(name)}</th>" for name in columns]]
+        rows += [[f"<td>{html.escape(f'{x:.6g}' if isinstance(x, float) else str(x))}</td>" for x in row] for row in zip(*(c[:100].tolist() for c in columns.values()))]
+        table = "".join(f"<tr>{''.join(row)}</tr>" for row in rows)
+        return f"<p>{html.escape(repr(self))}</p><table>{table}</table>"
+
+    def _columns(self, measures: Iterable[str]) -> dict[str, np.ndarray]:
+        """One row a point."""
+        grid = np.meshgrid(*self.values, indexing="ij")
+        names = [k if isinstance(k, str) else ",".join(k) for k in self.keys]
+        return {name: g.ravel() for name, g in zip(names, grid)} | {n: self[n].ravel() for n in measures}
+
     def to_pandas(self):
         """One row a point. Needs the package pandas."""
         import pandas
 
-        grid = np.meshgrid(*self.values, indexing="ij")
-        names = [k if isinstance(k, str) else ",".join(k) for k in self.keys]
-        return pandas.DataFrame({name: g.ravel() for name, g in zip(names, grid)} | {n: m.ravel() for n, m in self._measures.items()})
+        return pandas.DataFrame(self._columns(self._measures))
 
 
 def _number(text: str):
@@ -214,6 +231,24 @@ def scan(case, over: Mapping[str, Any], *, boundary: str | None = None, output: 
                     None if output is None else file)
 
 
+def export(what: Result | Frame, output: str | os.PathLike, *, frame: int = -1, subdivide: int | None = None) -> None:
+    """Writes a shape as flat triangles, .stl, .ply or .obj: `tubule export`, Frame.triangles().
+
+    what   a Frame, or a Result of which frame is taken
+
+    Raises ValueError for what cannot be written.
+    """
+    from .drawing import command_line, formats
+
+    if not isinstance(what, (Frame, Result)):
+        raise TypeError(f"a result or a frame is wanted, not {reprlib.repr(what)}")
+    try:
+        formats.check_output(file_name(output))
+        formats.write(file_name(output), *(what.frames[frame] if isinstance(what, Result) else what).triangles(subdivide))
+    except command_line.BadInput as error:
+        raise ValueError(str(error)) from None
+
+
 def energy_density(H, K, **moduli):
     """f(H, K) for moduli by name, such as k20=1, k42=0.06, H0=-1; numbers or arrays that broadcast."""
     return Case({"tier": "axisym", "energy": moduli, "shape": {"kind": "tube", "radius": 1.0, "length": 1.0},
@@ -228,4 +263,4 @@ def curvatures(r, dr, d2r, dz=1.0, d2z=0.0):
     return _core.profile_curvatures(r, dr, d2r, dz, d2z)
 
 
-__all__ = ["run", "run_many", "equilibrium", "stability", "compare", "scan", "Scan", "energy_density", "curvatures", "read"]
+__all__ = ["run", "run_many", "equilibrium", "stability", "compare", "scan", "Scan", "export", "energy_density", "curvatures", "read"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import reprlib
 from collections.abc import Iterable
 
 from .cases import file_name
@@ -59,6 +60,31 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
             style.save(figure, outputs)
             return figure
     except (BadInput, ValueError) as error:
+        raise ValueError(re.sub("--(?=[a-z])", "", str(error)).removeprefix("tubule plot: ")) from None
+
+
+def film(result: Result, output: str | os.PathLike, *, colour: str = "H", fps: float = 10) -> None:
+    """The film that `tubule plot --movie` makes, .gif or .mp4 (needs ffmpeg). Needs the packages matplotlib and h5py.
+
+    colour   "H", "K", "u_n", "p"
+
+    Raises ValueError for what cannot be shown, RuntimeError where a program is missing.
+    """
+    import matplotlib
+
+    from .drawing import command_line, movie, style
+    from .drawing.results import read_result
+
+    if not isinstance(result, Result):
+        raise TypeError(f"a result is wanted, not {reprlib.repr(result)}: read() gives that of a file")
+    try:
+        shown = read_result(io.BytesIO(result._core.image()), result._name)
+        options = command_line.plot_options([f"--colour={colour}", f"--fps={float(fps)!r}", "result"])
+        with matplotlib.rc_context(style.SETTINGS):
+            movie.draw(shown, shown.surfaces or shown.frames, file_name(output), options.colour[0], shown.title, options.fps)
+    except command_line.Unavailable as error:
+        raise RuntimeError(str(error)) from None
+    except command_line.BadInput as error:
         raise ValueError(re.sub("--(?=[a-z])", "", str(error)).removeprefix("tubule plot: ")) from None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import html
 import operator
 import os
 import tempfile
@@ -13,6 +14,7 @@ import numpy as np
 
 from . import _core
 from .cases import Case, file_name
+from .drawing import triangles
 
 
 class Series(Mapping):
@@ -69,7 +71,7 @@ class Frame:
     def cells(self) -> np.ndarray:
         """Node numbers of the curved triangles of a surface, in VTK's order of Lagrange triangles."""
         if self._mesh is None:
-            raise ValueError("this frame is a profile: revolve() makes a surface of it")
+            raise ValueError("this frame is a profile: triangles() makes a surface of it")
         return self._mesh["cells"]
 
     @property
@@ -89,27 +91,29 @@ class Frame:
         points[:, 2] += self._mesh["period"] * seen[:, 1]
         return points, inverse.reshape(cells.shape), seen[:, 0]
 
-    def revolve(self, around: int = 96, points: int = 401) -> tuple[np.ndarray, np.ndarray]:
-        """The surface of revolution of a profile as flat triangles: points [n, 3], cells [m, 3].
+    def triangles(self, subdivide: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Flat triangles: points [n, 3], and corners [m, 3], counter-clockwise seen from outside.
 
-        Raises ValueError for fewer than 3 points around the axis, and for more than ten million points in all.
+        A curved triangle becomes subdivide^2 flat ones (default: the square of its order). A profile is revolved with
+        24 subdivide points around its widest circle (default: 96). One period of a tube is open at its ends.
         """
-        around = operator.index(around)
-        if around < 3 or around * operator.index(points) > 10**7:
-            raise ValueError(f"a surface of revolution has 3 points or more around, and 10 million at most, not {around} x {points}")
-        r, z = self.profile(points)
-        angle = 2 * np.pi * np.arange(around) / around
-        xyz = np.stack([r[:, None] * np.cos(angle), r[:, None] * np.sin(angle), np.broadcast_to(z[:, None], (len(r), around))], axis=-1)
-        i, j = np.meshgrid(np.arange(len(r) - 1), np.arange(around), indexing="ij")
-        a, b, c, d = (k.ravel() for k in (i * around + j, i * around + (j + 1) % around, (i + 1) * around + (j + 1) % around, (i + 1) * around + j))
-        return xyz.reshape(-1, 3), np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        subdivide = None if subdivide is None else operator.index(subdivide)
+        if subdivide is not None and not 1 <= subdivide <= 64:
+            raise ValueError(f"subdivide must be from 1 to 64, not {subdivide}")
+        if self._mesh is None:
+            profile = (self[name] for name in "rzHK")
+            return triangles.of_profile(*profile, subdivide or 4, self.numbers.get("length", 0.0))
+        points, shifts = self.points[self.cells], self._mesh["shifts"]
+        if shifts is not None:
+            points[..., 2] += self._mesh["period"] * shifts
+        return triangles.of_surface(points, self.cells, self.order, subdivide or self.order, self._mesh["period"])
 
     def meshio(self):
         """A meshio.Mesh with all data of the nodes; profiles are revolved. Needs the package meshio."""
         import meshio
 
         if self._mesh is None:
-            points, cells = self.revolve()
+            points, cells = self.triangles()
             return meshio.Mesh(points, [("triangle", cells)])
         points, cells, node = self._whole()
         data = {name: a[node] for name, a in self.arrays.items() if name != "points" and len(a) == len(self.points)}
@@ -123,7 +127,7 @@ class Frame:
         from vtkmodules.vtkCommonDataModel import VTK_LAGRANGE_TRIANGLE, VTK_TRIANGLE, vtkCellArray, vtkUnstructuredGrid
 
         if self._mesh is None:
-            (points, cells), node, kind = self.revolve(), None, VTK_TRIANGLE
+            (points, cells), node, kind = self.triangles(), None, VTK_TRIANGLE
         else:
             (points, cells, node), kind = self._whole(), VTK_LAGRANGE_TRIANGLE
         grid, at, list_ = vtkUnstructuredGrid(), vtkPoints(), vtkCellArray()
@@ -212,6 +216,23 @@ class Result:
     def __repr__(self) -> str:
         rows = len(self.series["time"])
         return f"<tubule.Result {self.stop}, {rows} rows, {len(self.frames)} frames>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the page of `tubule view`, or why there is none."""
+        from .drawing import command_line
+
+        try:
+            command_line.require_libraries("the page of a result")
+            from .drawing import view
+
+            with tempfile.TemporaryDirectory() as folder:
+                file = os.path.join(folder, os.path.basename(self._name))
+                with open(file, "wb") as out:
+                    out.write(self._core.image())
+                page = view.page_of(view.run_page(file))
+            return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="600" style="border: 0"></iframe>'
+        except (command_line.Unavailable, command_line.BadInput) as error:
+            return f"<p>{html.escape(repr(self))}: {html.escape(str(error))}</p>"
 
 
 def _from_image(image: bytes, name: str) -> Result:

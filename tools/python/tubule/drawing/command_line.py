@@ -1,4 +1,4 @@
-"""The command lines of `tubule plot`, `view` and `chart`, and what all scripts that draw share. Standard library only."""
+"""The command lines of `tubule plot`, `view`, `export` and `chart`, and what all scripts that draw share. Standard library only."""
 
 import argparse
 import difflib
@@ -55,6 +55,12 @@ def integer(text):
         raise argparse.ArgumentTypeError(f"{text} is not an integer") from None
 
 
+def pieces(text):
+    if not 1 <= integer(text) <= 64:
+        raise argparse.ArgumentTypeError(f"{text} is not between 1 and 64")
+    return int(text)
+
+
 def listed(parse):
     return lambda text: [parse(one) for one in text.split(",") if one]
 
@@ -101,7 +107,7 @@ def camera(text):
         raise argparse.ArgumentTypeError(f"'{text}' is not AZIMUTH,ELEVATION in degrees, up to 360 and 90, such as -37,22") from None
 
 
-# ---- the three commands
+# ---- the commands
 
 
 class Parser(argparse.ArgumentParser):
@@ -234,6 +240,20 @@ def view():
     return parser
 
 
+def export():
+    parser = Parser(
+        "export", "Write a shape of a result as flat triangles: STL, PLY or OBJ",
+        ("figure.hdf -o figure.stl", "figure.hdf --frame 0 --subdivide 8 -o figure.ply"), {4: "the file could not be made"}, "meshes")  # fmt: skip
+    parser.option("result", metavar="RESULT", help="result of run or equilibrium")
+    parser.option("-o", "--output", type=file_name, action="append", required=True,
+                  help="file to write, .stl (binary), .ply (binary, double precision) or .obj; may be repeated")  # fmt: skip
+    parser.option("--frame", type=integer, metavar="INT", default="-1", help="which shape, counted from 0, or from -1 backwards")
+    parser.option("--subdivide", type=pieces, metavar="INT",
+                  help="n: a curved triangle becomes n^2 flat ones, a profile is revolved with 24 n points around its widest circle "
+                       "(default: the degree of the triangles; 4)")  # fmt: skip
+    return parser
+
+
 def chart():
     parser = Parser(
         "chart", "Run a case with many settings, and draw error against CPU time",
@@ -273,7 +293,7 @@ def plot_options(words):
 
 
 # The script's options by its name, for those that the program forwards.
-COMMANDS = {"plot": plot_options, "view": lambda words: view().parsed(words), "chart": lambda words: chart().parsed(words)}
+COMMANDS = {"plot": plot_options} | {make.__name__: lambda words, make=make: make().parsed(words) for make in (view, export, chart)}
 
 
 # ---- what scripts share

@@ -14,6 +14,7 @@ import numpy as np
 
 from .command_line import BadInput
 from .labels import as_label, flatten
+from .triangles import join_periods
 
 
 NORMAL_ONLY = 1e-3  # part of the speed below which a tangential velocity is only rounding of normals
@@ -89,7 +90,7 @@ class Surface:
     period: float = 0.0
     mesh: int = 0  # its number
     cells: np.ndarray | None = None
-    nodes: dict = field(default_factory=dict)  # arrays of nodes, by name
+    nodes: dict = field(default_factory=dict)  # arrays of points, by name; `node` has numbers, the same a period away
     parameter = None
 
     def quantity(self, name):
@@ -177,6 +178,7 @@ class Result:
         return [name[7:] for name in self.series if re.fullmatch(r"energy_(\d+(_\d+)?|formula|kg)", name)]
 
 
+SCHEMA = 2  # common/result/hdf5_objects.hpp
 BEST_COMPRESSION = 1032  # of deflate
 
 
@@ -211,6 +213,8 @@ def opened(path):
         raise BadInput(f"{path}: cannot be read as HDF5: give a file NAME.hdf that run, equilibrium or scan wrote") from error
     with file:
         elsewhere = file.id.links.visit(lambda name, link: name if link.type >= h5py.h5l.TYPE_EXTERNAL else None, info=True)
+        if file.attrs.get("schema", 1) > SCHEMA:
+            raise BadInput(f"{path}: was written by a later version of tubule, with schema {file.attrs['schema']}; this version reads 1 to {SCHEMA}")
         if elsewhere:
             raise BadInput(f"{path}: /{elsewhere.decode(errors='replace')} is a link to another file: not followed")
         try:
@@ -289,17 +293,25 @@ def _increasing(times):
 
 def _frames(path, file):
     """Profiles and surfaces."""
-    frames, surfaces = [], []
-    for name, record in sorted(file.get("frames", {}).items()):
-        if "time" not in record.attrs:
-            raise BadInput(f"{path}: frame {name} lacks its time")
-        if not np.isfinite(record.attrs["time"]):
-            raise BadInput(f"{path}: frame {name}: its time is not finite")
-        if "mesh" in record.attrs:
-            surfaces.append(_surface(path, name, record, file["meshes"]))
-        else:
-            frames.append(_profile(path, name, record))
-    return _in_time(frames), _in_time(surfaces)
+    frames = [_frame(path, name, record, file) for name, record in sorted(file.get("frames", {}).items())]
+    return (_in_time([frame for frame in frames if isinstance(frame, kind)]) for kind in (Frame, Surface))
+
+
+def _frame(path, name, record, file):
+    if "time" not in record.attrs:
+        raise BadInput(f"{path}: frame {name} lacks its time")
+    if not np.isfinite(record.attrs["time"]):
+        raise BadInput(f"{path}: frame {name}: its time is not finite")
+    return _surface(path, name, record, file["meshes"]) if "mesh" in record.attrs else _profile(path, name, record)
+
+
+def read_frame(path, number):
+    """A Frame or a Surface of a result, counted from 0, or from -1 backwards."""
+    with opened(path) as file:
+        names = sorted(file.get("frames", {}))
+        if not -len(names) <= number < len(names):
+            raise BadInput(f"{path}: no frame {number}: there are {f'0 to {len(names) - 1}' if names else 'none'}")
+        return _frame(path, names[number], file["frames"][names[number]], file)
 
 
 def _in_time(frames):
@@ -322,15 +334,10 @@ def _profile(path, name, record):
     return Frame(float(record.attrs["time"]), **arrays, parameter=parameter, period=float(record.attrs.get("length", 0)))
 
 
-def join_periods(points, period):
-    """Moves cells [cell, node, 3] of a tube, which remeshing leaves whole periods away from the others, beside these."""
-    z = points[..., 2]
-    z -= period * np.round((z.mean(axis=1, keepdims=True) - np.median(z)) / period)
-
-
 def _surface(path, name, record, meshes):
     number = int(record.attrs["mesh"])
-    order, period = (meshes[f"{number:06d}"].attrs[key] for key in ("order", "period"))
+    mesh = meshes[f"{number:06d}"]
+    order, period = (mesh.attrs[key] for key in ("order", "period"))
     cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     (points,) = _arrays(path, name, record, ("Points",))
     data = record["PointData"]
@@ -344,7 +351,8 @@ def _surface(path, name, record, meshes):
         raise BadInput(f"{path}: frame {name}: {names} must have one row per point")
     if ("u" in arrays) != ("u_n" in arrays):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
-    nodes, drawn = {"points": points} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p", "H0", "energy_density")
+    number_of = values(mesh["point_node"]) if period > 0 else np.arange(len(points))
+    nodes, drawn = {"points": points, "node": number_of} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p", "H0", "energy_density")
     of_cells = {key: array[cells] for key, array in nodes.items() if key in drawn}
     if period > 0:
         join_periods(of_cells["points"], period)
