@@ -12,7 +12,7 @@ namespace tubule::axisym {
 
 // Those that the law has at every point: unknowns, and the tension of a reservoir.
 struct PointNumbers {
-    double drift = 0, shift = 0, supply = 0, stretch = 0, tension = 0;
+    double drift = 0, shift = 0, supply = 0, stretch = 0, tension = 0, time = 0;
 };
 
 namespace {
@@ -41,6 +41,7 @@ template <class S>
 struct PointFields {
     std::array<S, n_slots> v;
     S r_t, z_t, ur_t, uz_t, w_t;
+    S climb;  // what the rise of a tube adds to z
 };
 
 // The law per unit of s, except the energy, the gauge and the volume. Long: a line for each term.
@@ -52,13 +53,18 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     std::array<S, n_rows> out;
     for (S& x : out) x = S(0.0);
     const S z_t = f.z_t - n.stretch * f.v[z0];  // less the motion of the stretching
+    const S place[]{r, f.v[z0] + f.climb, S(n.time)};
+    const bool pushed = law.source.push();
+    const S push_r = pushed ? law.source.force_at(0, place) : S(0.0),
+            push_z = pushed ? law.source.force_at(2, place) : S(0.0);
     if (!law.inextensible && law.lagrangian) {
         const S dS = (2 * pi) * (r * (g2 * ig));
-        out[kr] = dS * f.r_t, out[kz] = dS * f.z_t;
+        out[kr] = dS * (f.r_t - push_r), out[kz] = dS * (f.z_t - push_z);
         return out;
     }
     if (!law.inextensible) {
-        const S rate = (2 * pi) * (r * (f.r_t * z_s - z_t * r_s));  // X_t.nu dS/g
+        // (X_t - push).nu dS/g
+        const S rate = (2 * pi) * (r * ((f.r_t - push_r) * z_s - (z_t - push_z) * r_s));
         out[kr] = rate * z_s * ig + shift * (2 * pi) * (r * r_s);
         out[kz] = shift * (2 * pi) * (r * z_s) - rate * r_s * ig;
         out[shift_sum] = (2 * pi) * (r * (f.r_t * r_s + z_t * z_s));
@@ -79,13 +85,14 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     out[drift_sum] = dS * v;
 
     const S stretch_s = (r_s * f.v[ur1] + z_s * (f.v[uz1] + n.stretch * z_s)) * ig2, stretch_theta = u * inverse_r;
-    const S divergence = stretch_s + stretch_theta;
-    S force_r = law.friction * u - p * inverse_r + (2 * law.viscosity) * (stretch_theta * inverse_r);
-    S force_z = law.friction * v + drift;
+    const S divergence = stretch_s + stretch_theta, source = law.source.mass ? law.source.mass_at(place) : S(0.0);
+    S force_r = law.friction * u - p * inverse_r + (2 * law.viscosity) * (stretch_theta * inverse_r) - push_r;
+    S force_z = law.friction * v + drift - push_z;
     const S tension = ((2 * law.viscosity) * stretch_s - p) * ig2;
     if (law.inertia != 0) {
-        // What a reservoir feeds has the velocity of the membrane at every point: only the pressure sees it.
-        const S half = law.reservoir && !law.open_rim ? S(0.0) : 0.5 * divergence,
+        // What a reservoir or a source feeds has the velocity of the membrane at every point: only the pressure sees
+        // it.
+        const S half = law.reservoir && !law.open_rim ? S(0.0) : 0.5 * (divergence - source),
                 advect = -((dr * r_s + dz * z_s) * ig2);  // (u - X_t).t/g
         force_r += law.inertia * (f.ur_t + advect * f.v[ur1] + half * u - w * w * inverse_r);
         force_z += law.inertia * (f.uz_t + advect * f.v[uz1] + half * v);
@@ -93,7 +100,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
             const S shear = 0.5 * (ig * (f.v[w1] - w * r_s * inverse_r));
             const S viscous = (2 * law.viscosity) * (shear * ig);
             out[sw0] = dS * (law.inertia * (f.w_t + advect * f.v[w1] + half * w + u * w * inverse_r) +
-                             law.friction * w - viscous * r_s * inverse_r);
+                             law.friction * w - viscous * r_s * inverse_r - law.source.force_at(1, place));
             out[sw1] = dS * viscous;
         }
     }
@@ -101,7 +108,7 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
     out[mz0] = dS * force_z;
     out[mr1] = dS * tension * r_s;
     out[mz1] = dS * tension * z_s;
-    out[continuity] = -(dS * (divergence - n.supply));
+    out[continuity] = -(dS * (divergence - source - n.supply));
     out[stretch_sum] = out[mz1] * z_s;
     out[supply_sum] = dS * (p + n.tension);
     return out;
@@ -131,7 +138,8 @@ struct CurveMotion::Local {
                 rates[part] += signs[a] * rate[offset + dofs[a]] * load(b.by_point[0][a]);
             }
         }
-        fields.v[z1] += m.space().rise(y);
+        const double rise = m.space().rise(y);
+        fields.v[z1] += rise, fields.climb = rise * load(m.space().splines().basis(e, g).z);
         fields.r_t = rates[curve_r], fields.z_t = rates[curve_z];
         fields.ur_t = rates[velocity_r], fields.uz_t = rates[velocity_z], fields.w_t = rates[swirl];
     }
@@ -150,6 +158,7 @@ struct CurveMotion::Local {
             return x;
         };
         out.r_t = rate(fields.r_t, r0), out.z_t = rate(fields.z_t, z0);
+        out.climb = J(0.0), out.climb.v = fields.climb;
         out.ur_t = rate(fields.ur_t, ur0), out.uz_t = rate(fields.uz_t, uz0), out.w_t = rate(fields.w_t, w0);
         return out;
     }
@@ -269,7 +278,7 @@ Eigen::VectorXd CurveMotion::differential() const {
 
 PointNumbers CurveMotion::point_numbers(double t, const double* y) const {
     const auto number = [&](int at) { return at < 0 ? 0.0 : y[at]; };
-    return {number(at_.drift), number(at_.shift), number(at_.supply), number(at_.stretch), law_.tension.at(t)};
+    return {number(at_.drift), number(at_.shift), number(at_.supply), number(at_.stretch), law_.tension.at(t), t};
 }
 
 // Weights of the forces on the membrane.
@@ -660,9 +669,13 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             const Pack &r = f.v[r0], &r_s = f.v[r1], &z_s = f.v[z1];
             const Pack g2 = r_s * r_s + z_s * z_s, ig = 1.0 / sqrt(g2);
             const Pack dS = images * load(splines.basis(e, g).weight) * (2 * pi) * r * g2 * ig;
+            const Sources& source = law_.source;
+            const Pack place[]{r, f.v[z0] + f.climb, Pack(t)};
+            const Pack push_r = source.force_at(0, place), push_z = source.force_at(2, place);
             if (!law_.inextensible) {
                 const Pack normal = (f.r_t * z_s - (f.z_t - numbers.stretch * f.v[z0]) * r_s) * ig;
                 dissipation += dS * normal * normal;
+                supplied += dS * normal * (push_r * z_s - push_z * r_s) * ig;
                 speed = stdx::max(speed, normal * normal);
                 continue;
             }
@@ -677,7 +690,11 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
             acceleration += law_.inertia * dS * (f.ur_t * f.ur_t + f.uz_t * f.uz_t + f.w_t * f.w_t);
             momentum += dS * v;
             angular += dS * r * w;
-            const Pack div = ss + tt - numbers.supply;
+            const Pack made = source.mass_at(place);
+            if (source.act())
+                supplied += dS * (push_r * u + push_z * v + source.force_at(1, place) * w + f.v[p0] * made) +
+                            kinetic_here * made;
+            const Pack div = ss + tt - numbers.supply - made;
             divergence += dS * div * div;
             area += dS, pressure_sum += dS * f.v[p0];
             pull += dS * (2 * law_.viscosity * ss - f.v[p0]) * z_s * z_s * ig * ig;
@@ -692,6 +709,22 @@ CurveMotion::Balance CurveMotion::balance(double t, const double* y, const doubl
     const double tension = law_.inextensible ? -stdx::reduce(pressure_sum) / stdx::reduce(area) : 0;
     out.loads = loads_of(t, y, tension, stdx::reduce(pull));
     return out;
+}
+
+FormulaDomain::Margin CurveMotion::source_domain(double t, const double* y) const {
+    SourceDomain domain(law_.source);
+    if (!domain.restricted()) return {};
+    const SplineSpace& splines = space().splines();
+    const std::vector<double> rest(at_.size);
+    for (int e = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g) {
+            const Local at(*this, e, g, y, rest.data());
+            for (int q = 0; q < lanes; ++q) {
+                const double place[]{at.fields.v[r0][q], at.fields.v[z0][q] + at.fields.climb[q], t};
+                domain.look(place, splines.basis(e, g).z[q]);
+            }
+        }
+    return domain.margin();
 }
 
 // Given, or of the state: tension and pull (the part of the axial force that the velocity and p exert, times the

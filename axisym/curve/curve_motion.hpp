@@ -60,6 +60,7 @@ struct InitialState {
 //   ((X_t - u).nu, phi.nu) + c dJ[phi] = 0            the curve moves with u, its parameter stays even (gauge J)
 //   (u_t + c u_s/g + ..., v) + 2/Re (D(u), D(v)) + gamma (u, v) - (p, div v) + dE[v] + lambda dV[v] = 0
 //   (q, div u - supply) = 0,  dV[u] = 0
+// and with sources -(force, v) in the second row and div u - supply - mass in the third
 // with c = (u - X_t).t. Half of (div u - supply) u is added to the acceleration, by which the discrete kinetic energy
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
 // dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
@@ -105,7 +106,7 @@ public:
     // Kinetic energy and related integrals over the whole cell or period.
     struct Balance {
         double kinetic = 0, dissipation = 0;  // E_K, and the rate at which E + E_K falls
-        double supplied = 0;                  // kinetic energy that a reservoir brings, per time: theory.md (3.18)
+        double supplied = 0;                  // what a reservoir and sources bring, per time: theory.md (3.18), (3.27)
         double momentum_z = 0, angular_z = 0;
         double speed = 0;         // largest |u|; of the gradient flow |X_t.nu|
         double acceleration = 0;  // INT |u_t|^2 dS, at fixed parameter
@@ -113,6 +114,8 @@ public:
         Loads loads;              // given or measured; no force where there is neither a period nor beads
     };
     Balance balance(double t, const double* y, const double* rate) const;
+    // How far the formulas of sources are from where they are not defined; the place is s.
+    FormulaDomain::Margin source_domain(double t, const double* y) const;
 
     // Consistent unknowns and rates from the curve and velocities of y0 at t = 0, whose other entries are a guess:
     // after two implicit Euler steps of length h. Throws SolveError if Newton's method fails.

@@ -99,7 +99,7 @@ CurveLaw law_of(const Problem& c) {
     CurveLaw law = c.law;
     law.lagrangian =
         c.energy.H0_varies() || (law.inextensible && c.discretisation.parametrisation != Parametrisation::even);
-    law.swirls = c.velocity.initial == InitialVelocity::rotation;
+    law.swirls = c.velocity.initial == InitialVelocity::rotation || law.source.force[1];
     return law;
 }
 
@@ -161,7 +161,7 @@ InitialShape initial_shape(const Problem& c) {
     Curve whole = initial_curve(c);
     std::optional<PerturbedCurve> velocity = initial_velocity(c);
     if (!velocity && c.discretisation.symmetry && !c.energy.H0_varies() && c.energy.potentials.empty() &&
-        !c.law.beads && (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
+        !c.law.beads && !c.law.source.act() && (whole.topology == Topology::cell || whole.topology == Topology::tube)) {
         try {
             whole = half(whole);
         } catch (const std::invalid_argument&) {  // not mirror-symmetric
@@ -212,6 +212,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     require_defined(c, domain, fmt::format("s = {:.4g}", domain.place));
     CurveLaw law = law_of(c);
     require_pressure(c, start.volume);
+    if (space->topology() == Topology::tube) require_periodic_sources(c, start.meridian.length);
     law.swirls = law.swirls || (start.velocity && start.velocity->velocity->swirls);
     law.open_rim = space->is_patch() && law.reservoir;
     if (law.open_rim) law.lagrangian = false;
@@ -222,7 +223,7 @@ CurveSetup::CurveSetup(const Problem& of, const InitialShape& from, const CurveS
     const double variation =
         is_patch(start.meridian.topology) && is_flat(start.meridian) ? 0 : variation_of_H(*space, x);
     const bool patch_alone = space->is_patch() && !law.keeps_volume;  // a part of a sphere at first, but not later
-    law.holds_area = !law.reservoir &&
+    law.holds_area = law.conserves_area() &&
                      (patch_alone || (variation > same_everywhere && (variation > nearly_same || !law.keeps_volume)));
     // Where area and volume are the same condition, one multiplier has no value.
     const bool keeps_both = law.keeps_volume && !law.area_is_free() && !law.free_period;

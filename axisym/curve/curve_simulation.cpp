@@ -305,6 +305,7 @@ double CurveSimulation::share(double t) const {
     const int own = trace.limited_steps(step_growth_of(setup_.settings), t),
               other = coarser_->trace().limited_steps(step_growth_of(coarser(setup_.settings)), t);
     if (other >= few_steps && own < alike * other) return share_if_alike;
+    if (setup_.c.law.source.act()) return 1;  // what moves by itself forgets errors, what sources drive does not
     const double growing = start_steps * beginnings(setup_.motion->law(), t);
     return std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
 }

@@ -56,6 +56,7 @@ Snapshot measure(const CurveMotion& motion, double t, const double* y, const dou
     out.length = motion.length(y);
     out.coarse_bead = motion.bead_coarseness(y);
     out.free_energy = out.o.energy + loads_at(motion.law(), t).energy(out.o.area, out.o.volume, out.length);
+    if (const auto source = motion.source_domain(t, y); source.value < out.o.domain.value) out.o.domain = source;
     out.pressure_domain = pressure_domain(motion.law(), out.o.volume);
     return out;
 }

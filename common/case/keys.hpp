@@ -148,7 +148,21 @@ void keys(Keys& k, Shape& shape) {
 inline constexpr std::array<std::string_view, 1> pressure_variables{"V"};
 
 template <class Keys>
-void keys(Keys& k, Model& model) {
+void keys(Keys& k, Sources& source, Tier tier) {
+    const auto formula = [&](const std::string& key, std::shared_ptr<const Formula>& target) {
+        if (tier == Tier::surface3d)
+            k.formula(key, target, Sources::in_space);
+        else
+            k.formula(key, target, Sources::variables);
+    };
+    const std::array components = tier == Tier::surface3d ? std::array{"force_x", "force_y", "force_z"}
+                                                          : std::array{"force_r", "force_theta", "force_z"};
+    for (std::size_t i = 0; i < components.size(); ++i) formula(components[i], source.force[i]);
+    formula("mass", source.mass);
+}
+
+template <class Keys>
+void keys(Keys& k, Model& model, Tier tier) {
     Choices<ModelKind> kinds;
     Choices<std::optional<ModelKind>> candidates;  // that can stand for "auto"
     for (const ModelEntry& m : models) {
@@ -169,6 +183,7 @@ void keys(Keys& k, Model& model) {
     k.number("bead_width", model.bead_width, {.above = 0});
     k.ramp("extension", model.extension);
     k.choice("rim", model.rim, {{"clamped", Rim::clamped}, {"hinged", Rim::hinged}});
+    k.table("source", [&](auto& k) { keys(k, model.source, tier); });
     k.check("extension", [&] {
         return model.extension && !model.force.is_zero()
                    ? "holds the distance that model.force pulls at: give one of them"
@@ -414,7 +429,7 @@ void keys(Keys& k, Case& c) {
     });
     k.table("energy", [&](auto& k) { keys(k, c.energy, c.tier); });
     k.table("auto", [&](auto& k) { keys(k, c.automatic); });
-    k.table("model", [&](auto& k) { keys(k, c.model); });
+    k.table("model", [&](auto& k) { keys(k, c.model, c.tier); });
     k.optional_table("equilibrium", c.equilibrium,
                      [&](auto& k, EquilibriumChoices& e) { keys(k, e, c.model, c.energy); });
     k.table("velocity", [&](auto& k) { keys(k, c.velocity); });

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "common/case/read.hpp"
+
 namespace tubule {
 namespace {
 
@@ -46,6 +48,10 @@ Problem Problem::of_profile(double end, std::vector<double> output) const {
 }
 
 Problem Problem::of_surface() const {
+    if (law.source.force[0] || law.source.force[1])
+        throw complaint(*this, "model.source",
+                        "must have no force_r and no force_theta where a case goes on in tier surface3d, which has "
+                        "force_x and force_y instead");
     Case out = *this;
     out.tier = Tier::surface3d;
     return out;

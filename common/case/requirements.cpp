@@ -47,6 +47,7 @@ const Property free_area{"model.area = \"free\" or \"reservoir\"", [](P p) { ret
     beads{"model.bead_width", [](P p) { return p.law.beads.has_value(); }},
     pulled{"model.period = \"free\" or model.bead_width", [](P p) { return p.law.free_period || p.law.beads; }},
     kept{"a fixed area or volume", [](P p) { return p.law.keeps_volume || !p.law.area_is_free(); }},
+    fixed_area{"model.area = \"fixed\"", [](P p) { return !p.law.area_is_free(); }},
     as_begun{"fixed area and period, without tension, pressure or force",
              [](P p) { return !p.law.reservoir && !p.law.free_period && p.law.without_loads(); }};
 
@@ -172,6 +173,10 @@ const std::vector<Requirement> rows{
     number(
         "model.extension", [](P p) { return p.law.beads && p.law.beads->change(); }, {motion},
         "equilibria have a constant distance"),
+    key("model.source", {named_tier, motion, named_model, fixed_period, whole, resisted},
+        "its force and its membrane go to a motion"),
+    key("model.source.mass", {inextensible, fixed_area}, "it says how fast the area grows"),
+    key("model.source.force_theta", {inertia}, "in other models of this tier nothing turns about the axis"),
     key("velocity", {time, motion}, "nothing moves without it"),
     key("velocity.initial", {inertia}),
     value("velocity.initial", begins(InitialVelocity::rotation), {chosen_inertia}),

@@ -12,6 +12,7 @@
 
 #include "common/formula/formula.hpp"
 #include "common/model/ramp.hpp"
+#include "common/model/sources.hpp"
 
 namespace tubule {
 
@@ -52,6 +53,7 @@ struct Model {
     std::optional<double> bead_width{};                   // none: no beads
     std::optional<Ramp> extension{};                      // of their distance, where that is held
     Rim rim = Rim::clamped;                               // of patches
+    Sources source{};
 
     bool has_pressure() const { return pressure_of_volume || !pressure.is_zero(); }
 };
@@ -107,13 +109,13 @@ struct Loads {
 
 // The dimensionless law of motion of a membrane, theory.md (3.1), u its velocity and b the bending force:
 //   inertia (d_t u + grad_w u) = 2 viscosity div D(u) - friction u - grad p - p H nu + b nu + pressure nu
-// with lambda = -pressure where the volume is kept. An extensible membrane moves along its normal alone, without p:
+// with lambda = -pressure where the volume is kept, and with sources a body force on the right. An extensible membrane moves along its normal alone, without p:
 // friction u.nu = b + tension H + pressure. The multiplier of an area that is kept as a whole is a tension, too.
 struct MotionLaw {
     double inertia = 0;        // 0 or 1
     double viscosity = 0;      // 1/Re
     double friction = 0;       // gamma
-    bool inextensible = true;  // div u is the same everywhere, by the pressure p; 0 without a reservoir
+    bool inextensible = true;  // div u is the same everywhere, by the pressure p; 0 without a reservoir or a source
     bool keeps_volume = true;  // by the number lambda
     bool keeps_area = false;   // of extensible membranes: as a whole, by one number
     bool reservoir = false;    // of inextensible ones: feeds the membrane uniformly; the mean of p is -tension
@@ -123,17 +125,20 @@ struct MotionLaw {
     std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the ramp
     std::optional<Beads> beads{};
     Rim rim = Rim::clamped;  // of patches
+    Sources source{};
 
     // The L2 gradient flow of F: nothing is kept.
     bool unconstrained() const { return !inextensible && !keeps_volume && !keeps_area; }
     bool area_is_free() const { return inextensible ? reservoir : !keeps_area; }
-    // Whether F is E alone at all times, and nothing acts on places; whether work is done on the membrane in time.
+    // The area is neither free nor what a source makes of it.
+    bool conserves_area() const { return !area_is_free() && !source.mass; }
+    // Whether F is E alone at all times, and nothing acts at places; whether work is done on the membrane in time.
     bool without_loads() const {
-        return tension.is_zero() && pressure.is_zero() && force.is_zero() && !pressure_of_volume && !beads;
+        return tension.is_zero() && pressure.is_zero() && force.is_zero() && !pressure_of_volume && !beads && !source.act();
     }
     bool supplies_kinetic_energy() const { return reservoir && inertia != 0; }
     bool loads_change() const {
-        return !tension.is_constant() || !pressure.is_constant() || !force.is_constant() || (beads && beads->change());
+        return source.act() || !tension.is_constant() || !pressure.is_constant() || !force.is_constant() || (beads && beads->change());
     }
 };
 
@@ -184,7 +189,8 @@ inline MotionLaw motion_law(const Model& model) {
             .force = model.force,
             .pressure_of_volume = model.pressure_of_volume,
             .beads = std::move(beads),
-            .rim = model.rim};
+            .rim = model.rim,
+            .source = model.source};
 }
 
 }  // namespace tubule

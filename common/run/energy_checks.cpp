@@ -33,7 +33,8 @@ std::string key_of_formula(const Bending& energy) {
 }
 
 CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, const std::string& where) {
-    return complaint(c, key_of_formula(c.energy),
+    const std::string key = key_of_formula(c.energy);
+    return complaint(c, key == "energy" && c.law.source.act() ? "model.source" : key,
                      fmt::format("must be defined on the initial shape, but at {} {}", where, words(margin)));
 }
 
@@ -64,7 +65,7 @@ std::string unresolved_waves(const std::string& what, double times) {
 }
 
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where) {
-    return {Stop::undefined, time, fmt::format("the energy is hardly defined any more at {}: {}", where, words(margin)),
+    return {Stop::undefined, time, fmt::format("a formula is hardly defined any more at {}: {}", where, words(margin)),
             "choose a formula that is defined for all curvatures and places which the membrane may take"};
 }
 
@@ -112,6 +113,28 @@ void refuse_to_deform(const Problem& c) {
     if (c.law.beads) throw complaint(c, "model.bead_width", why);
     if (!c.energy.potentials.empty()) throw complaint(c, "energy.potential", why);
     if (c.energy.H0_varies()) throw complaint_about_H0(c, why);
+    if (c.law.source.act()) throw complaint(c, "model.source", why);
+}
+
+void require_periodic_sources(const Problem& c, double period) {
+    const Sources& source = c.law.source;
+    const bool in_space = c.tier == Tier::surface3d;
+    const auto refuse = [&](double z, double value, double next) {
+        throw complaint(c, "model.source",
+                        fmt::format("must have the period {0:.6g} of the tube along z, but a formula is {1:.6g} at z = "
+                                    "{2:.6g} and {3:.6g} at z = {4:.6g}: try functions of 2*pi*z/{0:.6g}",
+                                    period, value, z, next, z + period));
+    };
+    for (const auto& formula : {source.force[0], source.force[1], source.force[2], source.mass})
+        for (int i = 0; formula && i < 24; ++i) {
+            const double z = 0.037 * period * (i + 1), r = 0.6 + 0.07 * i, t = 0.11 * i;
+            const auto value = [&](double z) {
+                const double space[]{r, -0.3 * r, z, t}, plane[]{r, z, t};
+                return evaluate(*formula, in_space ? space : plane);
+            };
+            const double here = value(z), next = value(z + period);
+            if (std::abs(next - here) > 1e-6 * (1 + std::abs(here))) refuse(z, here, next);
+        }
 }
 
 namespace {

@@ -36,6 +36,8 @@ void require_beads(const Problem& c, bool closed, double distance);
 // CaseError for what would deform a sphere, or a straight tube with its period, of fixed area and volume: no other
 // shape has these, and no multiplier then holds the volume.
 void refuse_to_deform(const Problem& c);
+// Throws unless the sources of a tube have its period.
+void require_periodic_sources(const Problem& c, double period);
 
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.

@@ -38,7 +38,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"energy_alpha", "energy", "part of area-difference elasticity, alpha/2 (M - M0)^2, in E", SeriesUse::energy},
     {"potential_energy", "energy", "part of the potentials of places in E", SeriesUse::energy},
     {"free_energy", "energy", "F = E + tension A - pressure V - force L", SeriesUse::energy},
-    {"work", "energy", "work of changes of tension, pressure and force; kinetic energy from a reservoir",
+    {"work", "energy", "work of changes of tension, pressure and force, and of sources; kinetic energy from a reservoir",
      SeriesUse::energy},
     {"dissipation", "energy/time", "dissipation, at which F and the kinetic energy fall"},
     {"identity_defect", "energy", "defect of the energy identity", SeriesUse::diagnostic},

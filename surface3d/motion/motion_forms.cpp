@@ -85,6 +85,7 @@ private:
     // The state at a point. Many fields: all that the forms of a cell have there.
     struct Point {
         double dS, width, H, K, B2, trace;
+        Eigen::Vector3d x;
         Eigen::Vector3d normal;         // continuous
         Frame e;                        // orthonormal, tangential
         Eigen::Matrix<double, 2, 3> B;  // e^T B
@@ -129,6 +130,7 @@ private:
     void add_bending(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_varying_H0(const std::vector<Point>& at, CellWork& work) const;
     void add_pressure(const std::vector<Point>& at, CellWork& work) const;
+    void add_sources(const std::vector<Point>& at, CellWork& work) const;
     void add_places(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_curvature_evolution(const std::vector<Point>& at, int cell, CellWork& work) const;
     void add_stretch(const std::vector<Point>& at, int cell, CellWork& work) const;
@@ -167,6 +169,7 @@ Assembler::Point Assembler::point(const SurfacePoint<double>& p, const CellColum
     const auto phi = table_.value.col(q);
     at.dS = table_.weight[q] * p.area;
     at.width = triangle_width(p);
+    at.x = p.x;
     at.H = at.K = 0;
     for (int a = 0; a < n_; ++a) {
         at.H += phi[a] * base_.fields.H[space_.node(cell, a)];
@@ -404,6 +407,26 @@ void Assembler::add_pressure(const std::vector<Point>& at, CellWork& work) const
     work.block.block(p_, p_, n_p, n_p).noalias() += t.psi_grad.transpose() * slope;
 }
 
+// (force, v) and, with div_P u = mass, -(mass, q), known on X*; where nothing flows the force has the velocity
+// force/friction along the surface: theory.md (3.26).
+void Assembler::add_sources(const std::vector<Point>& at, CellWork& work) const {
+    if (!law_.source.act()) return;
+    const CellTables& t = work.t;
+    for (int q = 0; q < table_.points(); ++q) {
+        const Point& s = at[q];
+        const Eigen::Vector3d force = s.dS * law_.body_force(s.x, base_.time);
+        if (law_.flows)
+            for (int d = 0; d < 3; ++d) work.rhs.segment(d * n_, n_) += force[d] * t.phi.row(q).transpose();
+        else
+            work.rhs.head(nv_) += force.dot(s.normal) * t.normal.row(q).transpose();
+        if (p_ < 0) continue;
+        auto known = work.rhs.segment(p_, t.psi.cols());
+        known -= s.dS * law_.mass_source(s.x, base_.time) * t.psi.row(q).transpose();
+        if (!law_.flows)
+            known -= t.psi_grad.middleRows<2>(2 * q).transpose() * (s.e.transpose() * force) / law_.friction;
+    }
+}
+
 // How the force of densities W of places, -(W_nu - W H, v.nu) of theory.md (2.22), changes as the surface moves by xi
 // along the normal: -(W_nunu - W_nu H) xi + grad W.grad xi; what H adds is implicit with it, as of a tension.
 void Assembler::add_places(const std::vector<Point>& at, int cell, CellWork& work) const {
@@ -522,6 +545,7 @@ void Assembler::add_cell(int cell, CellWork& work, StepSystem& system) {
     add_bending(at, cell, work);
     add_varying_H0(at, work);
     add_pressure(at, work);
+    add_sources(at, work);
     add_places(at, cell, work);
     add_curvature_evolution(at, cell, work);
     add_stretch(at, cell, work);

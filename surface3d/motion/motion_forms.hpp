@@ -39,7 +39,8 @@ struct StepBase {
     const BeadEquations* beads = nullptr;
     BeadNumbers bead_numbers = BeadNumbers::Zero();
     double force = 0;
-    double M = 0;  // INT H of X*
+    double M = 0;     // INT H of X*
+    double time = 0;  // of sources
 };
 
 // What belongs to the stretch e of a free period, u = .. + e z e_z: theory.md (3.19), (10.18).

@@ -11,7 +11,7 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr int n_sums = 16;
+constexpr int n_sums = 17;
 using Sums = Eigen::Matrix<double, n_sums, 1>;
 
 Eigen::Vector3d push(const MovingSurface& surface, const MotionFields& fields, const CellColumns<3>& gradient, int cell,
@@ -24,10 +24,11 @@ Eigen::Vector3d push(const MovingSurface& surface, const MotionFields& fields, c
 }
 
 // Integrals over the surface: |u|^2, 2|sigma|^2, |grad_P u|^2, (div_P u)^2, |d_t u|^2, u, x cross u, x, |grad p - f_H0
-// grad H0|^2, p.
+// grad H0 - force|^2, p, power of sources.
 Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedMesh& mesh, const VectorField& u,
                const VectorField& rate, const MotionMeasures& m) {
     const SurfaceSpace& space = surface.space();
+    const SurfaceLaw& law = surface.law();
     const Tabulation& table = space.tabulation();
     Eigen::Matrix<double, n_sums, Eigen::Dynamic> of_cell(n_sums, space.cells());
     const bool presses = s.p.size() > 0, slips = presses && !surface.law().flows;
@@ -46,11 +47,18 @@ Sums integrals(const MovingSurface& surface, const MotionState& s, const CurvedM
             Eigen::Vector3d slip = Eigen::Vector3d::Zero();
             if (slips) slip = grad * nodal_p;
             if (pushed) slip -= push(surface, m.fields, grad, cell, q);
+            double power = 0;
+            if (law.source.act()) {
+                const Eigen::Vector3d force = law.body_force(p.x, s.time);
+                slip -= P * force;
+                power = force.dot(v) + law.mass_source(p.x, s.time) *
+                                           (nodal_p.dot(table.value.col(q)) + law.inertia / 2 * v.squaredNorm());
+            }
             const Eigen::Matrix3d G = P * (U * grad.transpose()) + s.stretch * along * along.transpose(),
                                   sigma = (G + G.transpose()) / 2;
             Sums here;
             here << v.squaredNorm(), 2 * sigma.squaredNorm(), G.squaredNorm(), G.trace() * G.trace(), a.squaredNorm(),
-                v, p.x.cross(v), p.x, slip.squaredNorm(), nodal_p.dot(table.value.col(q));
+                v, p.x.cross(v), p.x, slip.squaredNorm(), nodal_p.dot(table.value.col(q)), power;
             sum += table.weight[q] * p.area * here;
         }
         of_cell.col(cell) = sum;
@@ -88,7 +96,14 @@ void measure_symbol(const CurvedMesh& mesh, const Bending& bending, MotionMeasur
             m.symbol = least, m.least_symbol = mesh.nodes[i];
 }
 
-void measure_domain(const CurvedMesh& mesh, const Bending& bending, MotionMeasures& m) {
+void measure_domain(const CurvedMesh& mesh, const Bending& bending, const Sources& source, double time,
+                    MotionMeasures& m) {
+    SourceDomain of_sources(source);
+    for (int i = 0; i < mesh.size() && of_sources.restricted(); ++i) {
+        const Eigen::Vector4d at(mesh.nodes[i][0], mesh.nodes[i][1], mesh.nodes[i][2], time);
+        of_sources.look({at.data(), 4}, i);
+    }
+    m.domain = of_sources.margin();
     for (const Potential& p : bending.potentials) {
         if (p.is_wall()) continue;
         FormulaDomain domain(*p.formula);
@@ -156,6 +171,7 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
         const Eigen::RowVectorXd load = surface.flux(s.u, mesh, m.fields).transpose();
         m.dissipation = law.friction * load.dot(s.u) + sum[14] / law.friction;
     }
+    m.source_power = sum[16];
     m.length = s.period;
     if (law.beads) {
         const BeadNumbers beads = surface.bead_numbers(mesh);
@@ -187,7 +203,7 @@ MotionMeasures measure(MovingSurface& surface, const MotionState& s, const Motio
     m.turn = mesh_turn(mesh, m.quality, m.fields.H, m.fields.K);
     measure_neck(mesh, m);
     measure_symbol(mesh, bending, m);
-    measure_domain(mesh, bending, m);
+    measure_domain(mesh, bending, law.source, s.time, m);
     m.smoothness = smoothness_of(mesh, m.fields.H);
     return m;
 }

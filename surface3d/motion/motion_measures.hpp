@@ -18,8 +18,9 @@ struct Smoothness {
 struct MotionMeasures {
     Observables bending;  // with H and K of `fields`, to which the force belongs
     MotionFields fields;
-    VectorField velocity;    // at the nodes
-    double free_energy = 0;  // F = E + tension A - pressure V - force L, of what is given
+    VectorField velocity;     // at the nodes
+    double free_energy = 0;   // F = E + tension A - pressure V - force L, of what is given
+    double source_power = 0;  // theory.md (3.27)
     // Given, or what holds the area, the volume and the period or the distance of beads; 0 where that is undetermined.
     double tension = 0, pressure = 0, force = 0;
     double length = 0;                    // the period, or the distance of beads

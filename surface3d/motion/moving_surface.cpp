@@ -168,7 +168,11 @@ VectorField MovingSurface::velocity(const MotionState& state, const MotionFields
                          const PointH0 H0(bending_, gather_H0(space_, fields.H0, cell), gradient, phi,
                                           space_.gather(fields.H, cell).dot(phi),
                                           space_.gather(fields.K, cell).dot(phi));
-                         const Eigen::Vector3d slope = gradient * space_.gather(state.p, cell) - H0.push();
+                         Eigen::Vector3d slope = gradient * space_.gather(state.p, cell) - H0.push();
+                         if (law_.source.push()) {
+                             const Eigen::Vector3d force = law_.body_force(p.x, state.time);
+                             slope -= force - p.normal.dot(force) * p.normal;
+                         }
                          sum += (table.weight[q] * p.area / law_.friction * slope) * table.value.col(q).transpose();
                      }));
 }
@@ -229,7 +233,7 @@ Eigen::MatrixXd MovingSurface::open_rigid_motions(const CurvedMesh& mesh) const 
 }
 
 Eigen::VectorXd MovingSurface::momenta(const MotionState& state) const {
-    if (!law_.flows || law_.inertia == 0) return {};
+    if (!law_.flows || law_.inertia == 0 || law_.source.act()) return {};
     return momenta(mesh(state)).transpose() * state.u;
 }
 
@@ -280,7 +284,7 @@ BeadNumbers MovingSurface::held_beads(const CurvedMesh& mesh) const {
 Extent MovingSurface::lack(const CurvedMesh& mesh, double time, const BeadNumbers& beads) const {
     const Extent now = extent(space_, mesh);
     const double distance = law_.holds_distance() ? control_.distance + law_.beads->extension->at(time) : 0;
-    return {control_.area && !law_.area_is_free() ? *control_.area - now.area : 0,
+    return {control_.area && law_.conserves_area() ? *control_.area - now.area : 0,
             control_.volume && law_.keeps_volume ? *control_.volume - now.volume : 0,
             law_.holds_distance() ? distance - BeadEquations::distance(beads) : 0};
 }
@@ -319,7 +323,7 @@ VectorField MovingSurface::pulled(const MotionFields& f, const CurvedMesh& mesh,
 // Newton's method for up to three numbers: displacements along nu and H nu, those of the expected surface, or along nu
 // and z e_z, by which a straight tube meets both; and along nu near the beads.
 MovingSurface::Correction MovingSurface::correct(const MotionFields& f, bool with_volume, MotionState& s) const {
-    const bool area = !law_.area_is_free() && control_.area, volume = with_volume && control_.volume,
+    const bool area = law_.conserves_area() && control_.area, volume = with_volume && control_.volume,
                distance = law_.holds_distance();
     Correction out{VectorField::Zero(3, s.X.cols()), 0, {}};
     if (!area && !volume && !distance) return out;

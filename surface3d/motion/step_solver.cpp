@@ -44,7 +44,8 @@ StageSolution StepSolver::solve(const Stage& stage, const Extent& rate) {
                   .te = stage.te,
                   .curvature_stabilisation = curvature_stabilisation,
                   .tension = law.keeps_area ? stage.tension : law.tension.at(stage.time),
-                  .stretch = stretch};
+                  .stretch = stretch,
+                  .time = stage.time};
     if (surface_.bending().alpha) base.M = integral(surface_.space(), at, base.fields.H);
     if (law.beads) {
         base.beads = &*surface_.beads(), base.bead_numbers = surface_.bead_numbers(at);
@@ -170,7 +171,7 @@ Eigen::VectorXd StepSolver::solve(const StepBase& base, double time, const Exten
     const SurfaceLaw& law = surface_.law();
     const MotionControl& control = surface_.control();
     assemble(surface_.space(), unknowns_, law, surface_.bending(), base, system_);
-    if (law.inextensible && control.area && !law.reservoir)
+    if (law.inextensible && control.area && law.conserves_area())
         system_.b -= rate.area / *control.area * system_.pressure_load;
     if (!law.inextensible) system_.b -= law.tension.at(time) * system_.widening;
     const Loads given = loads_at(law, time);

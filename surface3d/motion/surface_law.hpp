@@ -1,6 +1,7 @@
 // A law of motion, theory.md (3.1), as a step of tier 2 solves for it.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 
 #include "common/model/model.hpp"
@@ -28,6 +29,15 @@ struct SurfaceLaw : MotionLaw {
     double potential_rate(double time, const Extent& rate, double volume) const {
         const Loads loads = loads_at(*this, time);
         return loads.tension * rate.area - loads.pressure_at(volume) * rate.volume - loads.force * rate.length;
+    }
+    // Sources at a point and a time: force and membrane per area.
+    Eigen::Vector3d body_force(const Eigen::Vector3d& x, double time) const {
+        const double at[]{x[0], x[1], x[2], time};
+        return {source.force_at(0, at), source.force_at(1, at), source.force_at(2, at)};
+    }
+    double mass_source(const Eigen::Vector3d& x, double time) const {
+        const double at[]{x[0], x[1], x[2], time};
+        return source.mass_at(at);
     }
     bool holds_distance() const { return beads && beads->extension; }
 };

@@ -31,6 +31,7 @@ void memory_fields(Fields&& f, Memory& m) {
         f.number("restart_area_past", m.balance.past.area);
     f.number("restart_volume_past", m.balance.past.volume), f.number("restart_length_past", m.balance.past.length);
     f.optional_number("restart_force_past", m.balance.force_past);
+    f.optional_number("restart_source_past", m.balance.source_past);
     f.optional_number("restart_bead_distance", m.scale.bead_distance);
     f.number("restart_corrected", m.balance.corrected), f.number("restart_error", m.error);
     f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.defect);

@@ -28,7 +28,8 @@ struct MotionBalance {
     double work = 0;                           // of the loads: dF at constant area and volume
     double supplied = 0;                       // kinetic energy, by a reservoir
     Extent past;                               // area, volume and length at the step before
-    double force_past = 0;                     // and the force that held the distance of beads
+    double force_past = 0;                     // and the force that held the distance of beads,
+    double source_past = 0;                    // and the power of sources
     double dissipated = 0, corrected = 0;
     double dissipation_past = 0;  // its rate at the step before
     double defect = 0;            // largest defect of the dissipation identity

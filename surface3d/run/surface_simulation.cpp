@@ -82,6 +82,7 @@ void SurfaceSimulation::begin(const Start& from) {
     summary.warnings = from.notes();
     const SurfaceSpace space(start.mesh);
     if ((initial_stop_ = find_fold(mesh_quality(start.mesh)))) return;
+    if (start.mesh.period > 0) require_periodic_sources(case_, start.mesh.period);
     remember_start(case_, start, space, memory_);
     summary.reference_energy = memory_.scale.reference_energy;
     memory_.next_step = first_step_from(std::min(first_step * memory_.scale.relaxation, case_.time.end - begin_time()));
@@ -197,7 +198,7 @@ std::optional<SurfaceSimulation::Refusal> SurfaceSimulation::check_trial(const M
                                                                          const MotionMeasures& m) const {
     const double t = state_.time, E_ref = memory_.scale.reference_energy;
     const double asked = case_.accuracy.energy * (is_reported() ? 1 : larger_errors);
-    const double then = m.free_energy + m.kinetic - memory_.balance.done() - work_of(next, m) - supplied_by(m);
+    const double then = m.free_energy + m.kinetic - memory_.balance.done() - work_of(next, m) - supplied_by(next, m);
     if (const auto spurious = impossible(m.bending, next.state))
         return Refusal{0.25, {spurious->reason, t, spurious->message, spurious->advice}};
     if (const auto rises = find_rise_in_step((then - total()) / E_ref, asked, t, next.state.step))
@@ -260,9 +261,12 @@ double SurfaceSimulation::work_of(const MotionStep& next, const MotionMeasures& 
                               power(extent_now(), now_.force), power(memory_.balance.past, memory_.balance.force_past));
 }
 
-// Kinetic energy that a reservoir brings in a step: the mean of it per area, times the new area. Exact where a surface
-// moves without a change of its velocity.
-double SurfaceSimulation::supplied_by(const MotionMeasures& m) const {
+// What sources bring in a step, or kinetic energy of a reservoir: the mean of it per area, times the new area. Exact
+// where a surface moves without a change of its velocity.
+double SurfaceSimulation::supplied_by(const MotionStep& next, const MotionMeasures& m) const {
+    if (surface().law().source.act())
+        return integral_over_step(next.state.step, state_.step, m.source_power, now_.source_power,
+                                  memory_.balance.source_past);
     if (!surface().law().supplies_kinetic_energy()) return 0;
     const double A = now_.bending.area, A_next = m.bending.area;
     return (now_.kinetic / A + m.kinetic / A_next) / 2 * (A_next - A);
@@ -270,7 +274,8 @@ double SurfaceSimulation::supplied_by(const MotionMeasures& m) const {
 
 void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.balance.work += work_of(next, m);
-    memory_.balance.supplied += supplied_by(m);
+    memory_.balance.supplied += supplied_by(next, m);
+    memory_.balance.source_past = now_.source_power;
     memory_.balance.past = extent_now(), memory_.balance.force_past = now_.force;
     memory_.balance.dissipated += integral_over_step(next.state.step, since_kink(), m.dissipation, now_.dissipation,
                                                      memory_.balance.dissipation_past);
@@ -521,7 +526,7 @@ double SurfaceSimulation::volume_drift() const {
 }
 
 void SurfaceSimulation::warn_of_drift() {
-    const double area = !surface().law().area_is_free() ? std::abs(now_.bending.area / memory_.scale.area - 1) : 0;
+    const double area = surface().law().conserves_area() ? std::abs(now_.bending.area / memory_.scale.area - 1) : 0;
     const double volume = std::abs(volume_drift());
     const std::string why = traits().controls_mesh ? "on this shape, keeping the area nearly keeps the volume"
                                                    : fmt::format("scheme \"{}\" does not correct them", traits().name);

@@ -84,7 +84,7 @@ private:
     std::optional<StopReport> impossible(const Observables& o, const MotionState& s) const;
     std::optional<Refusal> check_trial(const MotionStep& next, const MotionMeasures& m) const;
     double work_of(const MotionStep& next, const MotionMeasures& m) const;
-    double supplied_by(const MotionMeasures& m) const;
+    double supplied_by(const MotionStep& next, const MotionMeasures& m) const;
     double since_kink() const;
     void take(const MotionStep& next, const MotionMeasures& m);
     void choose_next_step(double tau, double asked, double error, int order);
