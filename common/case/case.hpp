@@ -11,6 +11,7 @@
 #include "common/case/case_input.hpp"
 #include "common/case/equilibrium_choices.hpp"
 #include "common/case/surface_choices.hpp"
+#include "common/case/units.hpp"
 #include "common/energy/bending.hpp"
 #include "common/model/model.hpp"
 #include "common/shapes/capsule.hpp"
@@ -160,6 +161,7 @@ struct Case {
 
     Tier tier = Tier::axisym;
     std::string title, source;
+    std::optional<Units> units;
     Bending energy;
     Model model;
     Velocity velocity;

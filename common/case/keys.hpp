@@ -60,6 +60,20 @@ struct OpenNames {
 };
 
 template <class Keys>
+void keys(Keys& k, Units& units) {
+    const auto quantity = [&](const char* key, std::string& text, QuantityKind kind, bool needed) {
+        k.text(key, text, needed, quantity_words(kind));
+        k.check(key, [&] { return text.empty() && !needed ? "" : wrong_quantity(text, kind); });
+    };
+    quantity("length", units.length, QuantityKind::length, k.required);
+    quantity("bending_rigidity", units.bending_rigidity, QuantityKind::energy, k.required);
+    quantity("temperature", units.temperature, QuantityKind::temperature, false);
+    quantity("viscosity", units.viscosity, QuantityKind::viscosity, false);
+    quantity("density", units.density, QuantityKind::density, false);
+    quantity("friction", units.friction, QuantityKind::friction, false);
+}
+
+template <class Keys>
 void keys(Keys& k, EnergyTerm& term) {
     k.number("modulus", term.modulus, {}, k.required);
     k.formula("formula", term.formula, EnergyTerm::variables);
@@ -427,6 +441,7 @@ void keys(Keys& k, Case& c) {
         k.text("title", c.title);
         k.text("source", c.source);
     });
+    k.optional_table("units", c.units, [](auto& k, Units& units) { keys(k, units); });
     k.table("energy", [&](auto& k) { keys(k, c.energy, c.tier); });
     k.table("auto", [&](auto& k) { keys(k, c.automatic); });
     k.table("model", [&](auto& k) { keys(k, c.model, c.tier); });

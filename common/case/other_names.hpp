@@ -21,6 +21,8 @@ inline constexpr std::array other_names{
     OtherName{"", " radius length ", "", "write it under [shape]"},
     OtherName{"", " end output ", "", "write it under [time]"},
     OtherName{"", " re gamma volume area tension pressure ", "", "write it under [model]"},
+    OtherName{"units", " kappa k_b kb kc k_c bending_modulus rigidity energy ", "bending_rigidity",
+              "write bending_rigidity"},
     OtherName{"energy", " kappa k_b kb kc k_c bending_rigidity bending_modulus rigidity ", "k20",
               "write k20 = kappa/2: the energy is INT k20 (H - H0)^2 dS, H the sum of the principal curvatures"},
     OtherName{"energy", " kappa_bar kappabar kbar k_bar kappa_g kg gaussian_modulus gaussian_rigidity ", "",

@@ -142,6 +142,7 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
     if (c.tier != Tier::axisym && !root.at_path("accuracy.r_min")) c.accuracy.r_min = 1e-2;
     if (c.tier != Tier::axisym && c.moves() && !root.at_path("accuracy.energy")) c.accuracy.energy = 1e-3;
     if (root.contains("expect") && !c.expect.stop) c.expect.stop = Stop::finished;
+    if (c.units) scales_of(c);  // refuses what contradicts the case
     return c;
 }
 

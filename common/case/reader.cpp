@@ -170,8 +170,7 @@ void Reader::flag(const std::string& key, bool& target) {
     });
 }
 
-void Reader::text(const std::string& key, std::string& target, bool needed) {
-    const std::string what = "a string";
+void Reader::text(const std::string& key, std::string& target, bool needed, const std::string& what) {
     const toml::node* node = find(key, what, needed);
     if (!node) return;
     collect([&] {

@@ -64,7 +64,7 @@ constexpr Rule rules[]{
     {R"([=\[,]\s*(?:)" NUMBER R"(\s*)?(pi\b))", 1, "numbers are written as digits: pi is 3.141592653589793"},
     {R"([=\[,]\s*([+\-]?)([iI]nf(?:inity|\.)?|[nN]a[nN])\b)", 2, "a number must be finite: write it as digits"},
     {R"([=\[,]\s*)" NUMBER R"(\s*([^\s\d.,;:=#"'+\-*/^()\[\]\{\}\x01-\x1f]\S*)\s*$)", 1,
-     "a number has no unit: all are dimensionless"},
+     "a number has no unit: all are dimensionless, but for texts such as \"50 nm\" in [units]"},
     {R"([=\[]\s*\[?\s*)" NUMBER R"((\s+))" NUMBER, 1, "numbers of a list are separated by commas: [1, 2]"},
     {R"([\[,]\s*(,))", 1, "between two commas a value is missing"},
     // Words.

@@ -51,7 +51,7 @@ public:
     }
 
     void flag(const std::string& key, bool value) { line(key, value ? "true" : "false"); }
-    void text(const std::string& key, const std::string& value, bool = false) {
+    void text(const std::string& key, const std::string& value, bool = false, const std::string& = {}) {
         if (!value.empty()) line(key, toml_string(value));
     }
     void increasing(const std::string& key, const std::vector<double>& values, const Range&) {

@@ -644,7 +644,17 @@ class Drawing(Folder):
         file.unlink()
 
     def test_profiles(self):
-        self.same(TUBE)
+        case = TUBE | {"units": {"length": "50 nm", "bending_rigidity": "20 kT", "friction": "2e4 Pa s/m"}}  # k20 = 1/2
+        self.same(case)
+        result = tubule.run(case)
+        for name, scale, unit in (("energy", 20, "kT"), ("r_min", 50, "nm"), ("order", 1, "")):
+            values, found = result.in_units(name)
+            self.assertEqual(found, unit)
+            np.testing.assert_allclose(values, scale * result.series[name])
+        axes = tubule.draw(result, kind="energy", units="length=2 um").axes[0]
+        self.assertEqual(axes.get_xlabel(), "time t (initial phase) [s]")
+        self.assertEqual(tubule.draw(result, kind="energy", units="none").axes[0].get_xlabel(), "time t (initial phase)")
+        self.assertEqual(tubule.run(TUBE).units, {})
 
     def test_surfaces(self):
         self.same(SURFACE, kind="cuts")

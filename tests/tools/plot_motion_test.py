@@ -19,6 +19,8 @@ from plot_test import PACKAGE, InFolder, replaced, resolved
 from drawing import cuts, flow, raster, results, series, style, surfaces  # found by way of plot_test
 from drawing.tubes import Column
 
+NOTHING = results.Result("a.hdf", {}, {}, {}, [], [])
+
 TUBULE = None
 OMEGA = np.array([0.0, 0.0, 3.0])
 
@@ -103,7 +105,7 @@ class Cuts(unittest.TestCase):
     def test_drawn_in_their_plane_to_scale(self):
         shapes = [moving_sphere(0, 1.0), moving_sphere(1, 0.5)]
         columns = [Column(s.time, [s], [None]) for s in shapes]
-        panel = cuts.CutPanel([None], [["a"]], columns, ("y", 0.0))
+        panel = cuts.CutPanel([NOTHING], [["a"]], columns, ("y", 0.0))
         figure = Figure(figsize=(style.WIDTH, panel.height))
         panel.draw(figure, 0.0)
         (axes,) = figure.axes
@@ -117,7 +119,10 @@ class Cuts(unittest.TestCase):
 
     def test_none_met_is_refused(self):
         with self.assertRaisesRegex(results.BadInput, "z = 2 meets none"):
-            cuts.CutPanel([None], [["a"]], [Column(0.0, [moving_sphere(0)], [None])], ("z", 2.0))
+            cuts.CutPanel([NOTHING], [["a"]], [Column(0.0, [moving_sphere(0)], [None])], ("z", 2.0))
+        in_nm = results.Result("a.hdf", {}, {}, {}, [], [], units={"length": {"scale": 50.0, "unit": "nm"}})
+        with self.assertRaisesRegex(results.BadInput, "z = 100 nm meets none"):  # asked for is z = 2 of the file
+            cuts.CutPanel([in_nm], [["a"]], [Column(0.0, [moving_sphere(0)], [None])], ("z", 2.0))
 
 
 class Arrows(unittest.TestCase):

@@ -487,7 +487,7 @@ class Films(InFolder):
     def test_refusals(self):
         one, two = write(self.folder / "one.hdf", times=(0,)), write(self.folder / "two.hdf")
         self.refused("a film needs two or more", one, "--movie", self.folder / "a.gif")
-        self.refused("--movie goes with --times, --label, --fps, --camera and one --colour only", two, "--movie", self.folder / "a.gif", "--dpi=100")
+        self.refused("--movie goes with --times, --label, --fps, --camera, --units and one --colour only", two, "--movie", self.folder / "a.gif", "--dpi=100")
         self.refused("one of .mp4, .gif", two, "--movie", self.folder / "a.avi")
         self.refused("does not exist", two, "--movie", self.folder / "no/a.gif")
         self.refused("shows one result", one, two, "--movie", self.folder / "a.gif")

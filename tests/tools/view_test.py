@@ -140,13 +140,11 @@ class Pages(unittest.TestCase):
                 panel = surfaces.SurfacePanel([result], [[""]], columns, ["H", "K"])
                 printed = [quantity.colours for quantity in panel.quantities]
             else:
-                panel = tubes.TubePanel([result], [[""]], tubes.choose_columns([result]))
-                printed = panel.H, panel.K
+                printed = tubes.TubePanel([result], [[""]], tubes.choose_columns([result]), ["H", "K"]).colours
             shown = {field["name"]: field for field in data_of(made(command)[1])["fields"]}
             for name, colours in zip("HK", printed):
                 self.assertEqual(shown[name]["shown"], [colours.norm.vmin, colours.norm.vmax])
                 self.assertEqual(shown[name]["colours"], view.colour_table(colours.map))
-            self.assertAlmostEqual(sum(shown["H"]["shown"]) / 2, result.H0, 12)
             middle = np.frombuffer(base64.b64decode(shown["H"]["colours"]), "u1").reshape(256, 3)[127:129]
             self.assertGreater(middle.min(), 240)  # white
 

@@ -473,7 +473,8 @@ TEST(EffectiveToml, WritesOverridesAndDefaultsOut) {
 TEST(EffectiveToml, ReadsBackExactly) {
     const Case c = parse_case(
         good,
-        {"about.title='quote \" backslash \\ tab \t'", "energy.k20=0.1234567890123456789", "energy.k40=1e300",
+        {"units.length=50 nm", "units.bending_rigidity=20 kT", "units.friction=2e4 Pa s/m",
+         "about.title='quote \" backslash \\ tab \t'", "energy.k20=0.1234567890123456789", "energy.k40=1e300",
          "energy.H0=-1e-300", "shape.mode.1={amplitude = -1e-5, n = 7, phase = 2}", "discretisation.elements=64",
          "discretisation.smoothness=2", "discretisation.time_tolerance=1e-10", "time.stationary=1e-8", "time.limit=3.5",
          "expect.stop=overhang", "expect.at.1={time = 0.3, area = {value = 12, rel = 1e-3, abs = 1}}",
@@ -483,6 +484,7 @@ TEST(EffectiveToml, ReadsBackExactly) {
     const Case again = parse_case(text, {}, "case.toml");
     EXPECT_EQ(effective_toml(again), text);
     EXPECT_EQ(again.title, "quote \" backslash \\ tab \t");
+    EXPECT_EQ(scales_of(again).time, scales_of(c).time);
     EXPECT_EQ(again.energy.k, c.energy.k);
     EXPECT_EQ(again.energy.H0, -1e-300);
     EXPECT_EQ(std::get<Tube>(again.shape).modes[1].phase, 2);

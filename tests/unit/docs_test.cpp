@@ -117,7 +117,9 @@ public:
         for (const auto& [name, meaning] : choices) add(key, "string", fmt::format("`\"{}\"`", name));
     }
     void flag(const std::string& key, bool) { add(key, "boolean", ""); }
-    void text(const std::string& key, const std::string&, bool = false) { add(key, "string", ""); }
+    void text(const std::string& key, const std::string&, bool = false, const std::string& = {}) {
+        add(key, "string", "");
+    }
     void increasing(const std::string& key, const std::vector<double>&, const Range&) {
         add(key, "list of floats", "");
     }
@@ -184,6 +186,7 @@ std::vector<Case> kinds_of_cases() {
     for (const ModelEntry& model : models)
         for (const bool is_free : {false, true}) {
             Case c;
+            c.units.emplace();
             c.model.kind = model.kind;
             c.model.keeps_volume = !is_free;
             c.model.area = !is_free ? AreaRule::fixed : model.inextensible ? AreaRule::reservoir : AreaRule::free;

@@ -33,6 +33,7 @@ struct Refused {
 };
 const std::string wall = "energy.potential=[{kind=\"plane\", z=-2, strength=1, range=0.1}]";
 const std::string H0_of_z = "energy.H0=sin(pi*z)", H0_of_area = "energy.H0=-1-0.1*area";
+const std::string units = "units={length=\"50 nm\", bending_rigidity=\"20 kT\"}";
 const std::vector<Refused> refused{
     {axisym, {"auto.modes=2"}, "tier = \"auto\""},
     {surface, {"shape={kind=\"patch\", radius=1}"}, "tier = \"axisym\""},
@@ -144,6 +145,9 @@ const std::vector<Refused> refused{
      "an initial shape whose curvature does not jump"},
     {axisym, {"discretisation.smoothness=1", "energy.kg=1"}, "discretisation.smoothness of 2"},
     {axisym, {"shape={kind=\"patch\", radius=1}", "energy.kg=1"}, "a closed surface or a tube"},
+    {axisym, {units, "units.viscosity=3e-9 Pa s m"}, "model.kind = \"stokes\" or"},
+    {axisym, {units, "units.density=5 mg/m^2"}, "model.kind = \"fluid\" or"},
+    {surface, {units, "units.friction=2e4 Pa s/m"}, "a table [time]"},
     {axisym, {"energy.M0=-20"}, "energy.alpha"},
     {surface, {wall}, "a table [time]"},
     {automatic,

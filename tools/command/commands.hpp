@@ -21,7 +21,7 @@ namespace tubule {
 // In the order in which --help lists them.
 #define TUBULE_COMMANDS(command)                                                                                     \
     command(run) command(equilibrium) command(stability) command(scan) command(confirm) command(check) command(show) \
-        command(plot) command(view) command(export) command(compare) command(chart)
+        command(units) command(plot) command(view) command(export) command(compare) command(chart)
 
 #define TUBULE_COMMAND(name) void add_##name(CLI::App& app, int& exit_status);
 TUBULE_COMMANDS(TUBULE_COMMAND)

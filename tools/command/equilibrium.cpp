@@ -9,21 +9,26 @@
 
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
+#include "common/series/catalogue.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
 #include "tools/command/installed.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/command/units.hpp"
 
 namespace tubule {
 
 namespace {
 
-// One line a shape. Growth rates: the largest of all m, and its m.
-Text table_of(const Result& result) {
+// One line a shape, in the units of the case if it has any. Growth rates: the largest of all m, and its m.
+Text table_of(const Result& result, const std::optional<Scales>& scales) {
     Text out;
     const auto has = [&](const char* name) { return result.series.contains(name); };
-    const auto value = [&](const std::string& name, std::size_t row) { return result.series.at(name)[row]; };
+    const auto unit = [&](const std::string& name) { return lab_unit(scales, find_series(name)->unit); };
+    const auto value = [&](const std::string& name, std::size_t row) {
+        return result.series.at(name)[row] * unit(name).scale;
+    };
     const bool branch = has("parameter"), branches = has("branch"), modes = has("growth_0"), rates = has("rate_1"),
                beads = has("bead_distance");
     if (branch) add(out, "{:>14}  ", "parameter");
@@ -31,6 +36,13 @@ Text table_of(const Result& result) {
     if (beads) add(out, " {:>12}", "force");
     if (modes || rates) add(out, "  {:>10} of m", "growth");
     add(out, "\n");
+    if (scales) {
+        add(out, "{}{:>16} {:>14} {:>14} {:>9} {:>10}", branch ? std::string(16, ' ') : "", unit("energy").name,
+            unit("tension").name, unit("pressure").name, unit("height").name, unit("r_max").name);
+        if (beads) add(out, "      {:>12}", unit("force").name);
+        if (modes || rates) add(out, "{}{:>10}", beads ? "  " : "       ", unit("rate_1").name);
+        add(out, "\n");
+    }
     const std::size_t rows = result.series.at("time").size();
     for (std::size_t i = 0; i < rows; ++i) {
         if (branches && i > 0 && value("branch", i) != value("branch", i - 1))
@@ -73,7 +85,7 @@ int find(const RunOptions& options) {
     for (const auto& file : files) {
         const Result result = read_result(file);
         if (result.series.contains("time") && !result.series.at("time").empty())
-            print_answer(to_string(table_of(result)));
+            print_answer(to_string(table_of(result, shown_scales(result.case_text, file.string()))));
     }
     return status;
 }

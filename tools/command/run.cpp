@@ -29,6 +29,7 @@
 #include "tools/command/help.hpp"
 #include "tools/command/installed.hpp"
 #include "tools/command/text.hpp"
+#include "tools/command/units.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
@@ -161,7 +162,9 @@ int compare(const Problem& c, const std::filesystem::path& file) {
 
 void report(const ChosenCase& chosen, const RunSummary& s, const std::string& file, double seconds) {
     const Problem& c = chosen.c;
-    const std::string when = c.moves() ? fmt::format(" at t = {:.6g}", s.stop.time) : "";
+    const auto scales = known_scales(c);
+    const LabUnit J = lab_unit(scales, "energy");
+    const std::string when = c.moves() ? " at t = " + with_unit(s.stop.time, lab_unit(scales, "time"), 6) : "";
     say(stdout, "{}: {}{}: {}\n", c.path, name(s.stop.reason), when, s.stop.message);
     const int status = exit_code(s.stop.reason);
     const std::string about =
@@ -170,10 +173,11 @@ void report(const ChosenCase& chosen, const RunSummary& s, const std::string& fi
         say(stdout, "    {}{}\n", s.stop.advice.empty() ? "what to do" : s.stop.advice, about);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
     if (s.reference_energy > 0 && s.error_is_known())
-        say(stdout, "    energy {:.9g}, error at most {:.2g} of E_ref = {:.4g} (estimated; {:.2g} asked)\n", s.energy,
-            s.estimated_error, s.reference_energy, c.accuracy.energy);
+        say(stdout, "    energy {}, error at most {:.2g} of E_ref = {} (estimated; {:.2g} asked)\n",
+            with_unit(s.energy, J, 9), s.estimated_error, with_unit(s.reference_energy, J, 4), c.accuracy.energy);
     else if (s.reference_energy > 0)
-        say(stdout, "    energy {:.9g}, error unknown; E_ref = {:.4g}\n", s.energy, s.reference_energy);
+        say(stdout, "    energy {}, error unknown; E_ref = {}\n", with_unit(s.energy, J, 9),
+            with_unit(s.reference_energy, J, 4));
     if (!chosen.reason.empty()) say(stdout, "    {}\n", words_of_choice(chosen));
     for (const auto& [key, value] : s.details)
         if (key == "choice" || key == "reason" || key == "triangles")
@@ -311,8 +315,7 @@ void refuse_to_replace_the_start(const Problem& c, const std::filesystem::path& 
 
 bool can_be_resumed(const Problem& c, const Result& result) {
     const auto stop = stop_of(result);
-    return !c.is_equilibrium() && (!stop || can_go_on(*stop)) &&
-           (!result.frames.empty() || result.checkpoint);
+    return !c.is_equilibrium() && (!stop || can_go_on(*stop)) && (!result.frames.empty() || result.checkpoint);
 }
 
 // A result of another case may be needed, and so may the hours of a run that can go on: only --overwrite replaces them.

@@ -18,6 +18,7 @@
 #include "common/result/checksums.hpp"
 #include "common/result/record.hpp"
 #include "common/result/start_frame.hpp"
+#include "common/series/catalogue.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/help.hpp"
@@ -25,6 +26,7 @@
 #include "tools/command/show_scan.hpp"
 #include "tools/command/streams.hpp"
 #include "tools/command/text.hpp"
+#include "tools/command/units.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/scan/scan_file.hpp"
 
@@ -34,7 +36,7 @@ namespace {
 
 struct ShowOptions {
     std::string file;
-    std::string output;
+    std::string output, units;
     bool overwrite = false;
     bool csv = false, json = false, verify = false;
     std::optional<long> frame;
@@ -69,8 +71,31 @@ bool alike(const Record& a, const Record& b) {
                       [](const auto& x, const auto& y) { return x.first == y.first; });
 }
 
+// What a summary is written in. Stationary shapes have numbers for times.
+struct Shown {
+    std::optional<Scales> scales;
+    bool numbered = false;
+};
+
+// Of a series, or of a number of a frame or about the run.
+LabUnit unit_of(const Shown& in, const std::string& name) {
+    if (name == "length") return lab_unit(in.scales, "length");  // the period of a frame
+    if (name == "E_ref") return lab_unit(in.scales, "energy");
+    if (name == "time" || name == "stop_time") return in.numbered ? LabUnit{} : lab_unit(in.scales, "time");
+    const SeriesEntry* entry = find_series(name);
+    return entry ? lab_unit(in.scales, entry->unit) : LabUnit{};
+}
+
+// The units below the names of add_frames.
+void add_units_of(Text& out, const Record& frame, const Shown& in) {
+    add(out, "{:>6} {:>14}{}", "", unit_of(in, "time").name, frame.mesh ? "       " : "");
+    for (const auto& [name, value] : frame.numbers)
+        if (!is_private(name)) add(out, " {:>14}", unit_of(in, name).name);
+    add(out, "\n");
+}
+
 // The numbers of the frames are the columns. Most results have frames that are all alike; else a new header says so.
-void add_frames(Text& out, const std::vector<Record>& frames) {
+void add_frames(Text& out, const std::vector<Record>& frames, const Shown& in) {
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const Record& frame = frames[i];
         if (i == 0 || !alike(frame, frames[i - 1])) {
@@ -78,11 +103,12 @@ void add_frames(Text& out, const std::vector<Record>& frames) {
             for (const auto& [name, value] : frame.numbers)
                 if (!is_private(name)) add(out, " {:>14}", name);
             add(out, "  arrays\n");
+            if (in.scales) add_units_of(out, frame, in);
         }
-        add(out, "{:>6} {:>14.8g}", i, frame.time);
+        add(out, "{:>6} {:>14.8g}", i, frame.time * unit_of(in, "time").scale);
         if (frame.mesh) add(out, " {:>6}", *frame.mesh);
         for (const auto& [name, value] : frame.numbers)
-            if (!is_private(name)) add(out, " {:>14.8g}", value);
+            if (!is_private(name)) add(out, " {:>14.8g}", value * unit_of(in, name).scale);
         add(out, "  {}\n", array_list(frame));
     }
 }
@@ -92,34 +118,43 @@ std::size_t cell_count(const SurfaceCells& mesh) {
     return mesh.cells.size() / ((k + 1) * (k + 2) / 2);
 }
 
-void add_meshes(Text& out, const std::vector<SurfaceCells>& meshes) {
+void add_meshes(Text& out, const std::vector<SurfaceCells>& meshes, const LabUnit& length) {
     if (meshes.empty()) return;
     add(out, "\n{:>6} {:>9} {:>9} {:>6}  periodic\n", "mesh", "triangles", "nodes", "order");
     for (std::size_t i = 0; i < meshes.size(); ++i)
         add(out, "{:>6} {:>9} {:>9} {:>6}  {}\n", i, cell_count(meshes[i]), meshes[i].nodes, meshes[i].order,
-            meshes[i].period > 0 ? fmt::format("in z, {:.8g}", meshes[i].period) : "no: closed");
+            meshes[i].period > 0 ? "in z, " + with_unit(meshes[i].period, length, 8) : "no: closed");
 }
 
-void add_summary(Text& out, const Result& result, const std::string& file) {
+void add_summary(Text& out, const Result& result, const std::string& file, const Shown& in) {
     const auto line = [&](std::string_view name, const std::string& value) { add(out, "{:<18} {}\n", name, value); };
     line("file", file);
     line("title", title_of(result, file));
     if (!result.case_text.sets.empty()) line("set", fmt::format("{}", fmt::join(result.case_text.sets, "  ")));
     const bool stopped =
         std::any_of(result.about.begin(), result.about.end(), [](const auto& entry) { return entry.first == "stop"; });
-    for (const auto& [name, value] : result.about) line(name, text_of(value));
+    if (in.scales)
+        line("units",
+             fmt::format("1 of length is {}, of energy {}; of time {}", with_unit(1, lab_unit(in.scales, "length"), 4),
+                         with_unit(1, lab_unit(in.scales, "energy"), 4),
+                         in.scales->time ? with_unit(1, lab_unit(in.scales, "time"), 4) : "not known"));
+    for (const auto& [name, value] : result.about) {
+        const LabUnit unit = unit_of(in, name);
+        const double* number = std::get_if<double>(&value);
+        line(name, number && !unit.name.empty() ? with_unit(*number, unit, 12) : text_of(value));
+    }
     if (!stopped) line("stop", "none yet: the run is still going, or was killed");
     const auto& times = result.series.at(result.series_names.front());
     line("rows", std::to_string(times.size()));
     line("frames", std::to_string(result.frames.size()));
-    if (result.checkpoint) line("checkpoint", fmt::format("time {:.8g}", result.checkpoint->time));
+    if (result.checkpoint) line("checkpoint", "time " + with_unit(result.checkpoint->time, unit_of(in, "time"), 8));
     if (!times.empty()) {
         add(out, "\nlast row\n");
         for (const std::string& name : result.series_names)
-            line("  " + name, fmt::format("{:.12g}", plain(result.series.at(name).back())));
+            line("  " + name, with_unit(result.series.at(name).back(), unit_of(in, name), 12));
     }
-    add_meshes(out, result.meshes);
-    add_frames(out, result.frames);
+    add_meshes(out, result.meshes, lab_unit(in.scales, "length"));
+    add_frames(out, result.frames, in);
 }
 
 // ---- CSV
@@ -246,6 +281,8 @@ Text shown_scan(const ShowOptions& options) {
 }
 
 Text shown(const ShowOptions& options) {
+    if (!options.units.empty() && (options.csv || options.json || is_scan(options.file)))
+        throw std::runtime_error("--units changes the summary of a result: CSV, JSON and scans are dimensionless");
     if (options.frame && !options.csv && !options.json) throw std::runtime_error("--frame needs --csv or --json");
     if (is_scan(options.file)) return shown_scan(options);
     const Result result = read_result(options.file);
@@ -257,7 +294,9 @@ Text shown(const ShowOptions& options) {
     else if (options.csv)
         add_table(out, frame ? frame_columns(result, *frame) : series_columns(result));
     else
-        add_summary(out, result, options.file);
+        add_summary(out, result, options.file,
+                    {shown_scales(result.case_text, options.file, options.units),
+                     result.series.contains("negative_directions")});
     return out;
 }
 
@@ -334,6 +373,10 @@ void add_show(CLI::App& app, int& exit_status) {
         ->add_flag("--verify", options->verify,
                    "only look whether the file is as it was written: exit status 1 if it is damaged")
         ->excludes(csv);
+    command->add_option(
+        "--units", options->units,
+        "of the summary: keys of [units], as \"length=50 nm,bending_rigidity=20 kT\", or none (default: "
+        "those of the case)");
     command->add_option("-o,--output", options->output, "write it to this file instead of stdout");
     command->add_flag("--overwrite", options->overwrite, "replace that file even if it is no such table");
     end_help(*command,

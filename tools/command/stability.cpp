@@ -227,6 +227,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
                              subject.c.energy.potentials.empty() && !subject.c.law.beads;
     if (closed_form) tube = subject.frame ? tube_of(subject.c, *subject.frame) : tube_of(subject.c);
     if (tube) {
+        tube->scales = known_scales(subject.c);
         if (options.tension) tube->tension = options.tension, tube->tension_source = "as asked";
         if (!options.plot.empty())
             if (const int status = draw_by_script("stability", "stability", {"--output", options.plot},
@@ -238,7 +239,8 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
         throw std::invalid_argument("--plot and --q apply only to straight tubes, in closed form");
     const Sphere* sphere = std::get_if<Sphere>(&subject.c.shape);
     if (sphere && !subject.frame && closed_form && !subject.c.equilibrium && sphere->modes.empty())
-        return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)}, models);
+        return sphere_report(options, {subject.c.energy, sphere->radius, options.tension.value_or(0)},
+                             known_scales(subject.c), models);
     if (options.waves) throw std::invalid_argument("--waves applies only to tubes and spheres, in closed form");
     if (subject.c.unknowns == Unknowns::surface || subject.c.unknowns == Unknowns::moving_surface)
         throw std::invalid_argument(

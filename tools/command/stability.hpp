@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/case/problem.hpp"
+#include "common/case/units.hpp"
 #include "common/result/result.hpp"
 #include "common/theory/dispersion.hpp"
 
@@ -47,6 +48,7 @@ struct TubeSubject {
     std::optional<double> tension;  // as asked, or as the frame has it
     std::string tension_source;     // of the above
     double end = 0;                 // until when the case runs; 0: nothing moves
+    std::optional<Scales> scales;   // of what is printed in words
 };
 
 // What the command prints. Throws std::invalid_argument for what cannot be asked, SolveError where an equilibrium is
@@ -59,7 +61,7 @@ StabilitySubject stability_subject(Result result, const StabilityOptions& option
 std::string tube_report(const StabilityOptions& options, const TubeSubject& subject,
                         const std::vector<Problem>& models);
 std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
-                          const std::vector<Problem>& models);
+                          const std::optional<Scales>& scales, const std::vector<Problem>& models);
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
                             const std::vector<Problem>& models);
 std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject);
@@ -79,7 +81,7 @@ struct SlowMode {
     int m;
 };
 // Rows of a table of them.
-std::string words_of_modes(const std::vector<SlowMode>& modes);
+std::string words_of_modes(const std::vector<SlowMode>& modes, const std::optional<Scales>& scales);
 
 // Name and numbers of its model.
 std::string words_of_model(const Problem& c);

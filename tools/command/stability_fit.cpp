@@ -15,6 +15,7 @@
 #include "surface3d/run/mesh_record.hpp"
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
+#include "tools/command/units.hpp"
 
 namespace tubule {
 
@@ -78,18 +79,21 @@ Amplitudes amplitudes_of(const Result& result, WaveNumbers wave) {
     return out;
 }
 
-std::string words_of(WaveNumbers wave, const Amplitudes& a, const theory::GrowthFit& fit,
-                     std::optional<double> linear) {
+std::string words_of(WaveNumbers wave, const Amplitudes& a, const theory::GrowthFit& fit, std::optional<double> linear,
+                     const std::optional<Scales>& scales) {
+    const LabUnit rate = lab_unit(scales, "1/time"), time = lab_unit(scales, "time"),
+                  length = lab_unit(scales, "length");
     const auto [low, high] = std::minmax_element(a.values.begin(), a.values.end());
-    std::string out = fmt::format("wave {},{}: {} amplitudes from the {}, {:.4g} to {:.4g}\n", wave.n, wave.m,
-                                  a.values.size(), a.source, *low, *high);
-    out += fmt::format("rate {:.10g} +- {:.2g} for t = {:.6g} to {:.6g} ({} points), e-fold in {:.6g}\n", fit.rate,
-                       fit.error, fit.from, fit.to, fit.points, 1 / std::abs(fit.rate));
+    std::string out = fmt::format("wave {},{}: {} amplitudes from the {}, {:.4g} to {:.4g}{}\n", wave.n, wave.m,
+                                  a.values.size(), a.source, *low * length.scale, *high * length.scale, length.after());
+    out += fmt::format("rate {:.10g} +- {:.2g}{} for t = {:.6g} to {} ({} points), e-fold in {}\n",
+                       fit.rate * rate.scale, fit.error * rate.scale, rate.after(), fit.from * time.scale,
+                       with_unit(fit.to, time, 6), fit.points, with_unit(1 / std::abs(fit.rate), time, 6));
     if (!(fit.error < 0.1 * std::abs(fit.rate)))
         out += "the amplitude is nowhere exponential, hence the large error bar\n";
     if (linear)
-        out += fmt::format("linear theory of the case over the same time: {:.10g}, differs by {:.2g}\n", *linear,
-                           fit.rate - *linear);
+        out += fmt::format("linear theory of the case over the same time: {}, differs by {}\n",
+                           with_unit(*linear, rate, 10), with_unit(fit.rate - *linear, rate, 2));
     return out;
 }
 
@@ -119,7 +123,7 @@ std::string fit_report(const StabilityOptions& options, const StabilitySubject& 
                         {"linear_rate", or_null(linear)},
                         {"time", a.times},
                         {"amplitude", a.values}});
-    return words_of(wave, a, fit, linear);
+    return words_of(wave, a, fit, linear, subject.case_is_known ? known_scales(subject.c) : std::nullopt);
 }
 
 }  // namespace tubule

@@ -12,6 +12,7 @@
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/text.hpp"
+#include "tools/command/units.hpp"
 
 namespace tubule {
 
@@ -72,40 +73,44 @@ axisym::Spectrum second_variation(const Problem& c, const MotionLaw& law, Held h
     return out;
 }
 
-void add_warm(std::string& out, double kT, const axisym::Spectrum& warm) {
-    out += "  mean squares of a, for displacements a phi with INT phi^2 dS = A\n";
+void add_warm(std::string& out, double kT, const axisym::Spectrum& warm, const LabUnit& square) {
+    out += fmt::format("  mean squares of a{}{}, for displacements a phi with INT phi^2 dS = A\n",
+                       square.name.empty() ? "" : " in", square.after());
     out += fmt::format("    m {:>14} {:>14} ...\n", "of all phi", "of each phi");
     for (const axisym::ModeRates& mode : warm.modes) {
-        add(out, "{:>5} {:>14.7g}", mode.m, of_all(kT, mode, warm.area));
-        for (const double one : mean_squares(kT, mode, warm.area)) add(out, " {:>14.7g}", one);
+        add(out, "{:>5} {:>14.7g}", mode.m, of_all(kT, mode, warm.area) * square.scale);
+        for (const double one : mean_squares(kT, mode, warm.area)) add(out, " {:>14.7g}", one * square.scale);
         out += "\n";
     }
     out += fmt::format("  estimated error {:.1e} (relative), {} elements\n", warm.estimated_error, warm.elements);
 }
 
-std::string words_of(const std::vector<Found>& found, double kT) {
+std::string words_of(const std::vector<Found>& found, double kT, const std::optional<Scales>& scales) {
+    const LabUnit unit = lab_unit(scales, "1/time");
     std::string out;
     for (const auto& [problem, spectrum, warm] : found) {
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words_of_model(problem));
         if (spectrum.at_rest())
-            add(out, "  stationary, with tension {:.8g}, pressure {:.8g}\n", spectrum.sigma, -spectrum.lambda);
+            add(out, "  stationary, with tension {}, pressure {}\n",
+                with_unit(spectrum.sigma, lab_unit(scales, "energy/length^2"), 8),
+                with_unit(-spectrum.lambda, lab_unit(scales, "energy/length^3"), 8));
         else
             out += "  in motion: growth rates hold at this instant only\n";
-        out += fmt::format("    m {:>14} ...\n", "rates");
+        out += fmt::format("    m {:>14} ...{}{}\n", "rates", unit.name.empty() ? "" : " in", unit.after());
         if (problem.law.free_period) out += "    0   left out: such waves change the free period\n";
         for (const axisym::ModeRates& mode : spectrum.modes) {
             out += fmt::format("{:>5}", mode.m);
-            for (const double rate : mode.rates) add(out, " {:>14.7g}", rate);
+            for (const double rate : mode.rates) add(out, " {:>14.7g}", rate * unit.scale);
             out += mode.stable() ? "\n" : "  grows\n";
         }
         if (!spectrum.modes.empty())
             add(out, "  slowest of m = {} ... {}\n{}", spectrum.modes.front().m, spectrum.modes.back().m,
-                words_of_modes(slowest(spectrum)));
+                words_of_modes(slowest(spectrum), scales));
         out += std::isfinite(spectrum.estimated_error)
                    ? fmt::format("  estimated error of the rates {:.1e} (relative)", spectrum.estimated_error)
                    : std::string("  error of the rates unknown: only the finest mesh was fine enough");
         out += fmt::format(", {} elements\n", spectrum.elements);
-        if (warm) add_warm(out, kT, *warm);
+        if (warm) add_warm(out, kT, *warm, lab_unit(scales, "length^2"));
     }
     return out;
 }
@@ -193,7 +198,7 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
         case Output::json:
             return json_text(found, options.kT.value_or(0));
         default:
-            return words_of(found, options.kT.value_or(0)) + refused;
+            return words_of(found, options.kT.value_or(0), known_scales(subject.c)) + refused;
     }
 }
 

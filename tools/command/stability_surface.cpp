@@ -13,6 +13,7 @@
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/text.hpp"
+#include "tools/command/units.hpp"
 
 namespace tubule {
 
@@ -64,13 +65,16 @@ SurfaceModes modes_of(const Problem& c) {
     return out;
 }
 
-std::string words_of(const SurfaceModes& found) {
+std::string words_of(const SurfaceModes& found, const std::optional<Scales>& scales) {
     const auto value = [&](const char* name) { return found.values.at(name); };
+    const LabUnit energy = lab_unit(scales, "energy");
     std::string out = "gradient flow\n";
-    add(out, "  stationary, with energy {:.8g} +- {:.1e}, tension {:.8g}, pressure {:.8g}\n", value("energy"),
-        value("energy_error"), value("tension"), value("pressure"));
+    add(out, "  stationary, with energy {:.8g} +- {:.1e}{}, tension {}, pressure {}\n", value("energy") * energy.scale,
+        value("energy_error") * energy.scale, energy.after(),
+        with_unit(value("tension"), lab_unit(scales, "energy/length^2"), 8),
+        with_unit(value("pressure"), lab_unit(scales, "energy/length^3"), 8));
     add(out, "  {:.0f} directions lower the energy under what is held\n", value("negative_directions"));
-    out += words_of_modes(found.modes);
+    out += words_of_modes(found.modes, scales);
     add(out, "  {:.0f} triangles\n", value("elements"));
     return out;
 }
@@ -95,12 +99,14 @@ std::string json_text(const SurfaceModes& found) {
 
 }  // namespace
 
-std::string words_of_modes(const std::vector<SlowMode>& modes) {
+std::string words_of_modes(const std::vector<SlowMode>& modes, const std::optional<Scales>& scales) {
+    const LabUnit rates = lab_unit(scales, "1/time"), times = lab_unit(scales, "time");
     std::string out = "    number    m           rate    e-fold in\n";
+    if (scales) add(out, "    {:>6} {:>4} {:>14} {:>12}\n", "", "", rates.name, times.name);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         const auto& [rate, m] = modes[i];
-        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}\n", i + 1, m < 0 ? "-" : std::to_string(m), rate,
-            1 / std::abs(rate), rate > 0 ? "  grows" : "");
+        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}\n", i + 1, m < 0 ? "-" : std::to_string(m), rate * rates.scale,
+            times.scale / std::abs(rate), rate > 0 ? "  grows" : "");
     }
     return out;
 }
@@ -123,7 +129,7 @@ std::string surface_report(const StabilityOptions& options, const StabilitySubje
         case Output::json:
             return json_text(found);
         default:
-            return words_of(found);
+            return words_of(found, known_scales(subject.c));
     }
 }
 

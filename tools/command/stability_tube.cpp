@@ -15,6 +15,7 @@
 #include "tools/command/json.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/text.hpp"
+#include "tools/command/units.hpp"
 #include "tools/scan/description.hpp"
 
 namespace tubule {
@@ -270,98 +271,127 @@ std::string ill_posed_words(const UniformTube& tube) {
 
 // ---- words
 
-// The time in which a wave grows or decays by the factor e; of a neutral one none.
-std::string e_fold(double rate) {
-    return rate == 0 ? "-" : fmt::format("{:.6g}", 1 / std::abs(rate));
+// What words about waves are written in.
+struct WaveUnits {
+    explicit WaveUnits(const std::optional<Scales>& scales)
+        : length(lab_unit(scales, "length")),
+          time(lab_unit(scales, "time")),
+          q(lab_unit(scales, "1/length")),
+          rate(lab_unit(scales, "1/time")),
+          velocity(lab_unit(scales, "length/time")),
+          tension(lab_unit(scales, "energy/length^2")),
+          square(lab_unit(scales, "length^2")) {}
+    LabUnit length, time, q, rate, velocity, tension, square;
+};
+
+// Rate, frequency, time and mean square of a wave in a table, and their units.
+std::string columns(const theory::Growth& growth, bool swings, std::optional<double> mean_square, const WaveUnits& in) {
+    const double s = growth.rate();
+    std::string out;
+    add(out, "{:>14.7g}", s * in.rate.scale);
+    if (swings) add(out, " {:>14.7g}", growth.frequency() * in.rate.scale);
+    add(out, " {:>12}", s == 0 ? "-" : fmt::format("{:.6g}", in.time.scale / std::abs(s)));  // neutral: none
+    if (mean_square) add(out, " {:>14.7g}", *mean_square * in.square.scale);
+    return out;
+}
+std::string unit_columns(bool swings, bool warm, const WaveUnits& in) {
+    return fmt::format("{:>14}{} {:>12}{}", in.rate.name, swings ? fmt::format(" {:>14}", in.rate.name) : "",
+                       in.time.name, warm ? fmt::format(" {:>14}", in.square.name) : "");
 }
 
-void add_rows(Text& out, const ModelReport& report, double end) {
+void add_rows(Text& out, const ModelReport& report, double end, const WaveUnits& in) {
     const bool numbered = !report.rows.empty() && report.rows.front().n, swings = report.problem.law.inertia != 0,
                factors = std::any_of(report.rows.begin(), report.rows.end(), [](const auto&r) { return r.factor; }),
                warm = !report.rows.empty() && report.rows.front().mean_square;
     add(out, "    m {}{:>12} {:>14}{} {:>12}{}{}\n", numbered ? "   n " : "", "q", "rate",
         swings ? "      frequency" : "", "e-fold in", warm ? "    mean square" : "",
-        factors ? fmt::format("  factor until t = {:g}", end) : "");
+        factors ? "  factor until t = " + with_unit(end, in.time, 6) : "");
+    if (!in.length.name.empty())
+        add(out, "      {}{:>12} {}\n", numbered ? "     " : "", in.q.name, unit_columns(swings, warm, in));
     for (const WaveRow& row : report.rows) {
         const double s = row.growth.rate();
         add(out, "{:>5} ", row.m);
         if (row.n) add(out, "{:>4} ", *row.n);
-        add(out, "{:>12.6g} {:>14.7g}", row.q, s);
-        if (swings) add(out, " {:>14.7g}", row.growth.frequency());
-        add(out, " {:>12}", e_fold(s));
-        if (row.mean_square) add(out, " {:>14.7g}", *row.mean_square);
+        add(out, "{:>12.6g} {}", row.q * in.q.scale, columns(row.growth, swings, row.mean_square, in));
         if (row.factor) add(out, " {:>14.6g}", *row.factor);
         add(out, "{}\n", row.q == 0 && row.m == 0 ? "  the radius" : s > 0 ? "  grows" : s == 0 ? "  neutral" : "");
     }
 }
 
-void add_model(Text& out, const ModelReport& report, int last, double end) {
+void add_model(Text& out, const ModelReport& report, int last, double end, const WaveUnits& in) {
     add(out, "\n{}\n", words_of_model(report.problem));
-    add(out, "  tension {:.8g} ({}), reduced {:.8g}\n", report.tube.tension, report.tension_source,
-        theory::reduced_tension(report.tube));
+    add(out, "  tension {} ({}), reduced {:.8g}\n", with_unit(report.tube.tension, in.tension, 8),
+        report.tension_source, theory::reduced_tension(report.tube));
     const auto grown = instabilities(report.tube, last);
     const bool ill = theory::ill_posed_along(report.tube) || theory::ill_posed_around(report.tube);
     const bool fits = std::ranges::any_of(report.rows, [](const WaveRow& row) { return row.growth.rate() > 0; });
     add(out, "  beyond the threshold of: {}{}\n", grown.empty() ? "none" : fmt::format("{}", fmt::join(grown, ", ")),
         grown.empty() || fits ? "" : " (by other waves than these)");
     if (const double rate = radius_rate_of(report); rate != 0)
-        add(out, "  the radius changes at the rate {:.6g}{}: growth rates hold at this instant only\n", rate,
-            report.radius_at_end ? fmt::format(" and is {:.6g} at t = {:g}", *report.radius_at_end, end)
-            : end > 0            ? fmt::format(" and cannot be followed to t = {:g}", end)
+        add(out, "  the radius changes at the rate {}{}: growth rates hold at this instant only\n",
+            with_unit(rate, in.velocity, 6),
+            report.radius_at_end ? fmt::format(" and is {} at t = {}", with_unit(*report.radius_at_end, in.length, 6),
+                                               with_unit(end, in.time, 6))
+            : end > 0            ? " and cannot be followed to t = " + with_unit(end, in.time, 6)
                                  : "");
     if (const auto least = least_k42_of(report.tube); least && !ill)
         add(out, "  no wave with m = 0 grows for k42 >= {:.6g}\n", *least);
-    add_rows(out, report, end);
-    const auto name_of = [](const WaveRow& row) {
-        return row.n ? fmt::format("n = {}, m = {}", *row.n, row.m) : fmt::format("q = {:.6g}, m = {}", row.q, row.m);
+    add_rows(out, report, end, in);
+    const auto name_of = [&](const WaveRow& row) {
+        return row.n ? fmt::format("n = {}, m = {}", *row.n, row.m)
+                     : fmt::format("q = {}, m = {}", with_unit(row.q, in.q, 6), row.m);
     };
     if (report.fastest_fitting)
-        add(out, "  fastest that fits the length: n = {}, m = {}, rate {:.7g}\n", report.fastest_fitting->n,
-            report.fastest_fitting->m, report.fastest_fitting->rate);
+        add(out, "  fastest that fits the length: n = {}, m = {}, rate {}\n", report.fastest_fitting->n,
+            report.fastest_fitting->m, with_unit(report.fastest_fitting->rate, in.rate, 7));
     if (const WaveRow* row = fastest_row(report)) {
         const double s = row->growth.rate();
         if (s <= 0)
-            add(out, "  none of these grows; {}: {}, rate {:.7g}\n", s < 0 ? "slowest to decay" : "neutral",
-                name_of(*row), s);
+            add(out, "  none of these grows; {}: {}, rate {}\n", s < 0 ? "slowest to decay" : "neutral", name_of(*row),
+                with_unit(s, in.rate, 7));
     }
     for (std::size_t m = 0; m < report.fastest.size(); ++m)
         if (const auto& fastest = report.fastest[m])
-            add(out, "  fastest of all with m = {}: q = {:.7g}{}, rate {:.7g}\n", m, fastest->q,
-                fastest->q > 0 ? fmt::format(" (length {:.6g})", 2 * pi / fastest->q) : "", fastest->rate);
+            add(out, "  fastest of all with m = {}: q = {}{}, rate {}\n", m, with_unit(fastest->q, in.q, 7),
+                fastest->q > 0 ? fmt::format(" (length {})", with_unit(2 * pi / fastest->q, in.length, 6)) : "",
+                with_unit(fastest->rate, in.rate, 7));
         else if (const auto bands = theory::growing_bands(report.tube, static_cast<int>(m));
                  !bands.empty() && std::isfinite(bands.back().to))
             add(out, "  no fastest of all with m = {}: the longer a wave, the faster it grows\n", m);
 }
 
-void add_thresholds(Text& out, const UniformTube& tube, const std::vector<Threshold>& limits, int last) {
+void add_thresholds(Text& out, const UniformTube& tube, const std::vector<Threshold>& limits, int last,
+                    const WaveUnits& in) {
     add(out, "\nwhere waves begin to grow, all else kept\n  {:<16} {:>3} {:>12}  {:>20} {:>14}\n", "", "m", "q",
         "tension", "reduced");
+    if (!in.length.name.empty()) add(out, "  {:<16} {:>3} {:>12}  {:>20}\n", "", "", in.q.name, in.tension.name);
     for (const Threshold& limit : limits) {
         UniformTube there = tube;
         there.tension = limit.tension;
-        add(out, "  {:<16} {:>3} {:>12.6g}  {} {:>14.8g} {:>14.8g}\n", limit.name, limit.m, limit.q,
-            limit.grows_above ? "above" : "below", limit.tension, theory::reduced_tension(there));
+        add(out, "  {:<16} {:>3} {:>12.6g}  {} {:>14.8g} {:>14.8g}\n", limit.name, limit.m, limit.q * in.q.scale,
+            limit.grows_above ? "above" : "below", limit.tension * in.tension.scale, theory::reduced_tension(there));
     }
     for (int m = 0; m <= last; ++m)
         if (!theory::stable_tensions(tube, m)) add(out, "  {:<16} {:>3} at every tension\n", instability(m), m);
     if (const auto stable = theory::common_stable_tensions(tube, last))
-        add(out, "  no wave with m <= {} grows for tensions from {:.8g} to {:.8g}\n", last, stable->lowest,
-            stable->highest);
+        add(out, "  no wave with m <= {} grows for tensions from {} to {}\n", last,
+            with_unit(stable->lowest, in.tension, 8), with_unit(stable->highest, in.tension, 8));
     else
         add(out, "  at every tension some wave with m <= {} grows\n", last);
 }
 
 std::string words_of(const TubeSubject& subject, const std::vector<ModelReport>& reports,
                      const std::vector<Threshold>& limits, int last) {
+    const WaveUnits in(subject.scales);
     Text out;
-    add(out, "tube of radius {:.8g} and length {:.8g}; {}\n", subject.tube.radius, subject.length,
-        moduli(subject.tube.energy));
+    add(out, "tube of radius {} and length {}; {}\n", with_unit(subject.tube.radius, in.length, 8),
+        with_unit(subject.length, in.length, 8), moduli(subject.tube.energy));
     if (!subject.waves.empty())
-        add(out, "its waves (amplitudes up to {:.4g}) are taken as small; --numerical uses the shape as it is\n",
-            std::abs(subject.waves.front().amplitude));
+        add(out, "its waves (amplitudes up to {}) are taken as small; --numerical uses the shape as it is\n",
+            with_unit(std::abs(subject.waves.front().amplitude), in.length, 4));
     add(out, "{}", ill_posed_words(subject.tube));
-    for (const ModelReport& report : reports) add_model(out, report, last, subject.end);
-    add_thresholds(out, subject.tube, limits, last);
+    for (const ModelReport& report : reports) add_model(out, report, last, subject.end, in);
+    add_thresholds(out, subject.tube, limits, last, in);
     return to_string(out);
 }
 
@@ -494,21 +524,25 @@ std::string tube_curves(const StabilityOptions& options, const TubeSubject& subj
 }
 
 std::string sphere_report(const StabilityOptions& options, const theory::UniformSphere& sphere,
-                          const std::vector<Problem>& models) {
+                          const std::optional<Scales>& scales, const std::vector<Problem>& models) {
+    const WaveUnits in(scales);
     const int last = options.waves.value_or(6);
     Text out;
     Json list = Json::array();
     if (options.csv) add(out, "model,l,rate,frequency,mean_square\n");
-    if (!options.csv) add(out, "sphere of radius {:.8g}; {}; for any m <= l\n", sphere.radius, moduli(sphere.energy));
+    if (!options.csv)
+        add(out, "sphere of radius {}; {}; for any m <= l\n", with_unit(sphere.radius, in.length, 8),
+            moduli(sphere.energy));
     for (const Problem& c : models) {
         const MotionLaw& law = c.law;
         const bool swings = law.inertia != 0, moves = law.unconstrained();
         theory::UniformSphere loaded = sphere;
         if (!options.tension && law.area_is_free()) loaded.tension = law.tension.at(0);
         const double radius_rate = law.pressure.at(0) - theory::pressure_at_rest(loaded);
-        if (!options.csv) add(out, "\n{}\n  tension {:.8g}\n", words_of_model(c), loaded.tension);
+        if (!options.csv) add(out, "\n{}\n  tension {}\n", words_of_model(c), with_unit(loaded.tension, in.tension, 8));
         if (!options.csv && moves)
-            add(out, "  the radius changes at the rate {:.6g}: growth rates hold at this instant only\n", radius_rate);
+            add(out, "  the radius changes at the rate {}: growth rates hold at this instant only\n",
+                with_unit(radius_rate, in.velocity, 6));
         const auto warm = [&](int l) -> std::optional<double> {
             if (!options.kT) return {};
             const double R = loaded.radius, scale = std::abs(density(loaded.energy, -2 / R, 1 / (R * R)).HH) *
@@ -523,6 +557,7 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
         if (!options.csv)
             add(out, "    l {:>14}{} {:>12}{}\n", "rate", swings ? "      frequency" : "", "e-fold in",
                 options.kT ? "    mean square" : "");
+        if (!options.csv && scales) add(out, "      {}\n", unit_columns(swings, options.kT.has_value(), in));
         for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
             const theory::Growth found = growth(loaded, law, l);
             const double s = found.rate();
@@ -531,9 +566,7 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
                 add(out, "{},{},{:.17g},{:.17g},{}\n", name(c.model), l, s, found.frequency(),
                     mean ? fmt::format("{:.17g}", *mean) : "");
             } else {
-                add(out, "{:>5} {:>14.7g}", l, s);
-                if (swings) add(out, " {:>14.7g}", found.frequency());
-                add(out, " {:>12}{}{}\n", e_fold(s), mean ? fmt::format(" {:>14.7g}", *mean) : "",
+                add(out, "{:>5} {}{}\n", l, columns(found, swings, mean, in),
                     s > 0    ? "  grows"
                     : s == 0 ? "  neutral"
                              : "");

@@ -30,6 +30,7 @@
 #include "tools/command/commands.hpp"
 #include "tools/command/compare.hpp"
 #include "tools/command/stability.hpp"
+#include "tools/command/units.hpp"
 #include "tools/python/memory_result.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/run/forecast.hpp"
@@ -323,6 +324,11 @@ void add_cases(py::module_& m) {
         .def_readonly("sets", &Problem::sets)
         .def_readonly("title", &Problem::title)
         .def_property_readonly("toml", [](const Problem& c) { return effective_toml(c); })
+        .def_property_readonly("units",
+                               [](const Problem& c) {
+                                   const auto scales = known_scales(c);
+                                   return scales ? line_of(json_of(*scales)) : "{}";
+                               })
         .def_property_readonly("is_equilibrium", [](const Problem& c) { return c.is_equilibrium(); });
     m.def(
         "parse_case",
@@ -347,6 +353,11 @@ void add_results(py::module_& m) {
                  const auto found = r.result->series.find(name);
                  if (found == r.result->series.end()) throw py::key_error(name);
                  return numpy(found->second);
+             })
+        .def("dimensions",
+             [](const Results&, const std::string& name) {
+                 const SeriesEntry* entry = find_series(name);
+                 return std::string(entry ? entry->unit : "");
              })
         .def("case",
              [](const Results& r, const std::string& name) { return Problem(case_of_result(*r.result, name, {})); })

@@ -78,7 +78,8 @@ std::map<std::string, std::string> values_of(const Case& c) {
     flatten(parse_toml(effective_toml(c), c.path), "", out);
     std::erase_if(out, [](const auto& entry) {
         const std::string& key = entry.first;
-        return key.starts_with("about.") || key.starts_with("expect.") || key == "time.limit";
+        return key.starts_with("about.") || key.starts_with("units.") || key.starts_with("expect.") ||
+               key == "time.limit";
     });
     return out;
 }

@@ -17,8 +17,8 @@ struct Difference {
     std::string key, there, here;
 };
 
-// All values of a case under their full keys as in --set, as TOML, defaults included, but for [about], [expect] and
-// time.limit.
+// All values of a case under their full keys as in --set, as TOML, defaults included, but for [about], [units],
+// [expect] and time.limit.
 std::map<std::string, std::string> values_of(const Case& c);
 
 // The keys in which two cases differ, of those.
@@ -46,8 +46,8 @@ std::optional<std::size_t> frame_index(const Result& result, long number);
 std::optional<Stop> stop_of(const Result& result);
 
 // Whether the run of a result goes on with this case: false if it is complete. Throws CaseError where it must not: the
-// case is another one but for its end, outputs, limits, [about] and [expect], or the end is earlier than what the
-// result has reached, or later where nothing can follow.
+// case is another one but for its end, outputs, limits, [about], [units] and [expect], or the end is earlier than what
+// the result has reached, or later where nothing can follow.
 bool goes_on(const Case& c, const Result& result, const std::filesystem::path& file);
 
 // Output times of the case that a run which goes on from here no longer passes and that have no frame.

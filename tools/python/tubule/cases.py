@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
@@ -132,6 +133,14 @@ class Case:
     def toml(self) -> str:
         """The whole case as TOML: overrides applied, defaults written out."""
         return self._core.toml
+
+    @property
+    def units(self) -> dict:
+        """What a number of the case stands for, by its dimensions: {"energy": {"scale": 20.0, "unit": "kT"}, ...}.
+
+        Empty without a table [units]; as long as the unit of time is not known, without those of rates and the like.
+        """
+        return json.loads(self._core.units)
 
     def forecast(self) -> dict:
         """What a run is expected to take: resolution, steps, seconds, bytes (None where that is not known)."""

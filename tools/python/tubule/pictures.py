@@ -16,7 +16,8 @@ from .results import Result, read
 def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = None, *, kind: str = "all",
          times: Iterable[float] = (), colour: Iterable[str] = (), labels: Iterable[str] = (), plane: tuple[str, float] = ("z", 0.0),
          scale: str = "run", series: Iterable[str] = (), x: str = "time", logx: bool = False, logy: bool = False,
-         quantity: str = "", slices: Iterable[str] = (), camera: tuple[float, float] = (-37.0, 22.0), width: float = 7.0, dpi: float = 300):  # fmt: skip
+         quantity: str = "", slices: Iterable[str] = (), camera: tuple[float, float] = (-37.0, 22.0), width: float = 7.0, dpi: float = 300,
+         units: str = ""):  # fmt: skip
     """The picture that `tubule plot` makes, as a matplotlib.figure.Figure. Needs the packages matplotlib and h5py.
 
     what      a Result, several ones (labelled by what differs in their cases), or names of result files; a Scan that
@@ -30,6 +31,7 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
     camera    azimuth and elevation in degrees
     width     inches of the page, 3 to 20
     dpi       pixels per inch, 30 to 1200
+    units     keys of [units], as "length=50 nm,bending_rigidity=20 kT", or "none"; by default those of the case
     The others are as the options of `tubule plot`. Raises ValueError for what cannot be drawn.
 
     >>> figure = draw(tubule.run(tube), kind="energy")
@@ -40,10 +42,11 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
 
     from .drawing import command_line, plot, scan, style
     from .drawing.results import BadInput, read_result
+    from .drawing.units import convert
 
     outputs = [file_name(path) for path in ([output] if isinstance(output, (str, os.PathLike)) else output or [])]
     words = [f"--kind={kind}", f"--colour={','.join(colour)}", f"--scale={scale}", f"--plane={plane[0]}={float(plane[1])!r}", f"--x={x}",
-             f"--camera={float(camera[0])!r},{float(camera[1])!r}", f"--width={float(width)!r}",
+             f"--camera={float(camera[0])!r},{float(camera[1])!r}", f"--width={float(width)!r}", f"--units={units}",
              f"--times={','.join('end' if time == float('inf') else repr(float(time)) for time in times)}", f"--series={','.join(series)}", *(f"--label={label}" for label in labels)]  # fmt: skip
     try:
         options = command_line.plot_options([*words, *["--logx"] * bool(logx), *["--logy"] * bool(logy), "result"])
@@ -56,7 +59,8 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
                 if quantity or slices:
                     raise BadInput("--quantity and --slices belong to scans, and this is none")
                 results = [each if isinstance(each, Result) else read(each) for each in _listed(what)]
-                figure = plot.figure_of([read_result(io.BytesIO(result._core.image()), result._name) for result in results], options)
+                read_ones = [read_result(io.BytesIO(result._core.image()), result._name) for result in results]
+                figure = plot.figure_of([convert(one, _units(result, units)) for one, result in zip(read_ones, results)], options)
             style.save(figure, outputs)
             return figure
     except (BadInput, ValueError) as error:
@@ -74,18 +78,24 @@ def film(result: Result, output: str | os.PathLike, *, colour: str = "H", fps: f
 
     from .drawing import command_line, movie, style
     from .drawing.results import read_result
+    from .drawing.units import convert
 
     if not isinstance(result, Result):
         raise TypeError(f"a result is wanted, not {reprlib.repr(result)}: read() gives that of a file")
     try:
-        shown = read_result(io.BytesIO(result._core.image()), result._name)
+        shown = convert(read_result(io.BytesIO(result._core.image()), result._name), _units(result, ""))
         options = command_line.plot_options([f"--colour={colour}", f"--fps={float(fps)!r}", "result"])
         with matplotlib.rc_context(style.SETTINGS):
-            movie.draw(shown, shown.surfaces or shown.frames, file_name(output), options.colour[0], shown.title, options.fps)
+            movie.draw(shown, shown.surfaces or shown.frames, file_name(output), options.colour[0], shown.title, options.fps, options.camera)
     except command_line.Unavailable as error:
         raise RuntimeError(str(error)) from None
     except command_line.BadInput as error:
         raise ValueError(re.sub("--(?=[a-z])", "", str(error)).removeprefix("tubule plot: ")) from None
+
+
+def _units(result: Result, units: str) -> dict:
+    changes = dict(part.split("=", 1) for part in units.split(",")) if units not in ("", "none") else {}
+    return {} if units == "none" else result.case.with_({f"units.{key}": value for key, value in changes.items()}).units
 
 
 def _listed(what) -> list:

@@ -204,6 +204,17 @@ class Result:
     def case(self) -> Case:
         return Case._of(self._core.case(self._name))
 
+    @property
+    def units(self) -> dict:
+        """As Case.units. Stationary shapes have numbers for times, without a unit."""
+        units = self.case.units
+        return {of: unit for of, unit in units.items() if of != "time" or not self.case._core.is_equilibrium}
+
+    def in_units(self, name: str) -> tuple[np.ndarray, str]:
+        """A series in the units of the case, and the name of its unit: ([251.3, ...], "kT"); "" where it has none."""
+        unit = self.units.get(self._core.dimensions(name), {"scale": 1.0, "unit": ""})
+        return self.series[name] * unit["scale"], unit["unit"]
+
     def __reduce__(self):
         return _from_image, (self._core.image(), self._name)
 

@@ -10,7 +10,8 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from . import style
-from .labels import formula, number, power
+from .labels import formula, in_unit, number, power
+from .units import OF_FRAMES
 
 COVERED = 0.98  # part of the membrane area whose curvature is inside the colour scale
 MARGIN = 1.25  # the colour scale extends beyond that by this factor
@@ -27,7 +28,7 @@ LABELS = {
     "H0": "spontaneous curvature H\u2080",
     "p": "pressure p",
     "energy_density": "bending energy per area f",
-    "u_n": "normal velocity u\u2099, > 0: outward",
+    "u_n": "normal velocity u\u2099",
 }
 
 
@@ -42,8 +43,9 @@ class Colours:
         return plt.get_cmap(self.map)(self.norm(values))[..., :3]
 
 
-def colour_scale(values, areas, centre):
-    """A symmetric scale around `centre` that covers nearly all area, so that a pinching neck does not bleach the rest."""
+def colour_scale(values, areas, centre, one=1.0):
+    """A symmetric scale around `centre` that covers nearly all area, so that a pinching neck does not bleach the rest.
+    `one`: what the number 1 of the file is."""
     distance = np.abs(np.concatenate(values) - centre)
     area = np.concatenate(areas)
     order = np.argsort(distance)
@@ -51,8 +53,8 @@ def colour_scale(values, areas, centre):
     half = MARGIN * distance[order][min(np.searchsorted(covered, COVERED), distance.size - 1)]
     if half < distance.max() <= WHOLE * half:
         half = distance.max()
-    if half < ROUNDING * max(1.0, abs(centre)):
-        half = max(1.0, abs(centre))
+    if half < ROUNDING * max(one, abs(centre)):
+        half = max(one, abs(centre))
     beyond_low = any((v < centre - half).any() for v in values)
     beyond_high = any((v > centre + half).any() for v in values)
     extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond_low, beyond_high]
@@ -74,37 +76,38 @@ def is_far(centre, values, areas):
     return max(low - centre, centre - high) > FAR * (high - low) > 0
 
 
-def about_mean(values, areas):
+def about_mean(values, areas, one=1.0):
     """A scale around the rounded mean, and words that say so."""
     mean = np.average(np.concatenate(values), weights=np.concatenate(areas))
     low, high = covered_range(values, areas)
     digits = 2 if high == low else max(2, 1 + int(np.ceil(np.log10(max(abs(low), abs(high)) / (high - low)))))
     centre = float(f"{mean:.{digits}g}")
-    return colour_scale(values, areas, centre), f", white: mean \u2248 {number(centre)}"
+    return colour_scale(values, areas, centre, one), f", white: mean \u2248 {number(centre)}"
 
 
 def colours_of(name, results, shapes, areas):
     """The colours of a quantity: one scale for all shapes; `areas` has the area of each of their values, a list per shape."""
     values = [np.ravel(shape.quantity(name)) for shape in shapes]
+    one, label = results[0].scale(OF_FRAMES[name]), in_unit(LABELS[name], results[0].unit(OF_FRAMES[name]))
     if name == "u_n":
         largest = max(float(np.abs(v).max()) for v in values) or 1.0
-        return Colours("RdBu_r", Normalize(-largest, largest), "neither", LABELS[name])
+        return Colours("RdBu_r", Normalize(-largest, largest), "neither", label + ", > 0: outward")
     if name == "energy_density":
         low, high = covered_range(values, areas)
-        low = min(0.0, low)
-        return Colours("magma_r", Normalize(low, max(MARGIN * high, low + 1e-9)), "max" if max(map(np.max, values)) > MARGIN * high else "neither", LABELS[name])
+        low, high = min(0.0, low), MARGIN * high
+        return Colours("magma_r", Normalize(low, max(high, low + ROUNDING * one)), "max" if max(map(np.max, values)) > high else "neither", label)
     centre, words = 0.0, ""
     if name == "H":
         common = {result.H0 for result in results}
         centre = common.pop() if len(common) == 1 else 0.0
         words = f", white: {formula('H_0')} = {number(centre)}" if centre else ""
     if name in ("H0", "p") or centre is None or (name in "HK" and is_far(centre, values, areas)):
-        scale, words = about_mean(values, areas)
+        scale, words = about_mean(values, areas, one)
     else:
-        scale = colour_scale(values, areas, centre)
+        scale = colour_scale(values, areas, centre, one)
     if scale[1] != "neither":  # a neck, say
         words += f", from {power(min(map(np.min, values)), 2)} to {power(max(map(np.max, values)), 2)}"
-    return Colours(MAPS[name], *scale, LABELS[name] + words)
+    return Colours(MAPS[name], *scale, label + words)
 
 
 def bars_height(count):

@@ -107,6 +107,12 @@ def camera(text):
         raise argparse.ArgumentTypeError(f"'{text}' is not AZIMUTH,ELEVATION in degrees, up to 360 and 90, such as -37,22") from None
 
 
+def units(text):
+    if text not in ("", "none") and not all("=" in part for part in text.split(",")):
+        raise argparse.ArgumentTypeError(f"'{text}' is neither none nor key=value,..., as in length=50 nm,bending_rigidity=20 kT")
+    return text
+
+
 # ---- the commands
 
 
@@ -224,6 +230,7 @@ def plot():
     option("--slice", action="append", default=[], help="of a scan with more than two axes: key=value of an axis that is cut; may be repeated")
     option("--confirmed", help="of a scan: the output of `tubule confirm --json`, whose points are marked on the map")
     option("--width", type=number(3, 20), metavar="FLOAT", default="7", help="inches of the page; below 5, for a column of a journal, legends and colour bars are below each other")
+    option("--units", type=units, default="", help="keys of [units], as \"length=50 nm,bending_rigidity=20 kT\", or none (default: those of the case)")
     option("--dpi", type=number(30, 1200), metavar="FLOAT", default="300", help="pixels per inch of a .png, and of surfaces within .svg and .pdf")
     option("--movie", help="film to write instead, .mp4 (needs ffmpeg) or .gif: the shape of one result, frame by frame, "
                            "coloured by H or the given --colour, and its energy")  # fmt: skip

@@ -61,7 +61,7 @@ class CurvePanel(ProfilePanel):
     MAX_LENGTH = 3.2
 
     def __init__(self, results, labels, columns, names):
-        self.motions = [Motion(result.frames) for result in results]
+        self.motions = [Motion(result.frames, result.unit("length/time"), result.scale("1/time")) for result in results]
         self.velocity = names == ["u_n"]
         super().__init__(results, labels, columns, names)
 
@@ -76,11 +76,12 @@ class CurvePanel(ProfilePanel):
 
     def _words(self, column, row):
         frame, result = column.cells[row], self.results[row]
-        words = [caption(column, row, result.is_equilibrium)]
+        words = [caption(column, row, result)]
         if frame and frame.parameter is not None:
             key = result.case.get("equilibrium", {}).get("branch", {}).get("vary", "parameter")
             name = symbol(key.split(".")[-1]).replace("_", " ")
-            words.append(f"{name}{chr(10) if len(name) > 8 else ' '}= {power(frame.parameter, 4)}")
+            value = f"{power(frame.parameter, 4)} {result.parameter_unit}".rstrip()
+            words.append(f"{name}{chr(10) if len(name) > 8 else ' '}= {value}")
         if self.velocity and frame and frame.u_n is not None:
             words.append(self.motions[row].words(frame))
         return "\n".join(word for word in words if word)

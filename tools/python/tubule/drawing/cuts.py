@@ -5,7 +5,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from . import raster, style
-from .labels import MINUS, number
+from .labels import MINUS, in_unit, number
 from .results import BadInput
 from .style import line_colours, time_title
 
@@ -50,13 +50,14 @@ class CutPanel:
 
     def __init__(self, results, labels, columns, plane):
         self.labels = [""] if len(results) == 1 else [", ".join(label) for label in labels]
-        axis, self.level = plane
+        axis, self.level = plane[0], plane[1] * results[0].scale("length")
+        self.unit, self.time_unit = results[0].unit("length"), results[0].unit("time")
         self.axis = "xyz".index(axis)
         self.across = [i for i in range(3) if i != self.axis]
         self.columns = columns
         self.cuts = [[cut(s, self.axis, self.level) if s else None for s in column.cells] for column in columns]
         points = [c[..., self.across].reshape(-1, 2) for column in self.cuts for c in column if c is not None and len(c)]
-        self.name = f"{axis} = {number(self.level)}"
+        self.name = f"{axis} = {number(self.level)} {self.unit}".rstrip()
         if not points:
             raise BadInput(f"--plane: {self.name.replace(MINUS, '-')} meets none of the surfaces")
         points = np.concatenate(points)
@@ -78,18 +79,18 @@ class CutPanel:
         for row, label in enumerate(self.labels):
             axes = figure.add_axes([left / width, (bottom + 0.38) / height, self.wide / width, self.tall / height])
             axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
-            axes.set_xlabel("xyz"[self.across[0]], labelpad=1)
+            axes.set_xlabel(in_unit("xyz"[self.across[0]], self.unit), labelpad=1)
             if row:
                 axes.tick_params(labelleft=False)
             else:
-                axes.set_ylabel("xyz"[self.across[1]], labelpad=1)
+                axes.set_ylabel(in_unit("xyz"[self.across[1]], self.unit), labelpad=1)
             axes.set_title(label, pad=3)
             for colour, column in zip(colours, self.cuts):
                 if column[row] is not None:
                     lines = LineCollection(column[row][..., self.across], colors=[colour], linewidths=1, capstyle="round")
                     axes.add_collection(lines, autolim=False)
             left += self.wide + GAP
-        titles = [time_title(i, column.time) for i, column in enumerate(self.columns)]
+        titles = [time_title(i, column.time, self.time_unit) for i, column in enumerate(self.columns)]
         handles = [Line2D([], [], color=colour, label=title) for colour, title in zip(colours, titles)]
         axes.legend(handles=handles, title=f"cut {self.name}", title_fontsize=7, loc="upper left",
                     bbox_to_anchor=(1.02, 1.02), borderaxespad=0, labelspacing=0.35)  # fmt: skip

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
 from . import style
-from .labels import formula, number, symbol
+from .labels import formula, in_unit, number, symbol
 from .style import DASHES, MARKERS, Legend, axes_at, few_ticks, line_colours, time_name, time_text
 
 STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
@@ -111,6 +111,7 @@ class EnergyPanel:
         if self.high is not None:
             self.end = min(self.end, self.high)
         self.settled = max(map(settling_time, results))
+        self.time_unit = results[0].unit("time")
         self.colours = line_colours(len(results))
         self.terms = [] if self._terms_hide_change() else visible_terms(results)
         self.apart = self.kinetic and 1 < len(results) <= MOST_AXES
@@ -146,15 +147,16 @@ class EnergyPanel:
             axes[1].tick_params(labelleft=False)
             self._lines(axes[0], 0, initial, False)
             self._lines(axes[1], 0, self.end, False)
-            axes[0].set_xlabel("time t (initial phase)", labelpad=2)
-            axes[1].set_xlabel("time t (whole run)", labelpad=2)
+            axes[0].set_xlabel(in_unit("time t (initial phase)", self.time_unit), labelpad=2)
+            axes[1].set_xlabel(in_unit("time t (whole run)", self.time_unit), labelpad=2)
         else:
             axes = [axes_at(figure, left, low, wide, HEIGHT)]
             self._lines(axes[0], start, self.end, decades)
-            axes[0].set_xlabel("time t", labelpad=2)
+            axes[0].set_xlabel(in_unit("time t", self.time_unit), labelpad=2)
             if split:
                 self._draw_inset(axes[0], self.every, initial)
-        name = relative_ticks(axes[0].yaxis, "energy" if self.kinetic else "bending energy E")
+        name = in_unit("energy" if self.kinetic else "bending energy E", self.results[0].unit("energy"))
+        name = relative_ticks(axes[0].yaxis, name)
         for one in axes if self.rows > 1 else axes[:1]:
             one.set_ylabel(name, labelpad=3)
         self.legend.draw(axes[-1], bottom)
@@ -169,7 +171,7 @@ class EnergyPanel:
             axes = axes_at(figure, x, y, size, HEIGHT, sharey=drawn[0] if drawn else None)
             axes.tick_params(labelleft=self.rows > 1 or k == 0)
             self._lines(axes, start, self.end, decades, [one])
-            axes.set_xlabel("time t", labelpad=2)
+            axes.set_xlabel(in_unit("time t", self.time_unit), labelpad=2)
             axes.set_title(label, pad=11)
             drawn.append(axes)
         for axes, one in zip(drawn, self.every):  # when the common range of energies is known
@@ -245,7 +247,8 @@ class EnergyPanel:
             if not self.apart:  # else its axes have its name
                 handles.append(Line2D([], [], color=colour, marker=marker, mec="white", mew=0.4, label=label))
             if result.stopped_early:
-                text = f"{result.stopped_early} at t = {time_text(result.about.get('stop_time', result.end_time))}"
+                time = time_text(result.about.get("stop_time", result.end_time), self.time_unit)
+                text = f"{result.stopped_early} at t = {time}"
                 handles.append(Line2D([], [], label=text, **STOP_MARK))
         shade = self.colours[0] if self.lone else "0.3"
         if self.kinetic:
@@ -291,6 +294,7 @@ class BranchPanel:
         keys = {result.case.get("equilibrium", {}).get("branch", {}).get("vary") for result in self.results}
         name = symbol(keys.pop().split(".")[-1]).replace("_", " ") if len(keys) == 1 and None not in keys else "parameter of the branch"
         along = all("parameter" in result.series for result in self.results)
-        axes.set_xlabel(name if along else "number of the shape", labelpad=2)
-        axes.set_ylabel(relative_ticks(axes.yaxis, "bending energy E"), labelpad=3)
+        unit = self.results[0].parameter_unit if len({result.parameter_unit for result in self.results}) == 1 else ""
+        axes.set_xlabel(in_unit(name, unit) if along else "number of the shape", labelpad=2)
+        axes.set_ylabel(relative_ticks(axes.yaxis, in_unit("bending energy E", self.results[0].unit("energy"))), labelpad=3)
         self.legend.draw(axes, bottom)

@@ -34,12 +34,13 @@ def draw_arrow_key(figure, left, bottom, words):
 class Motion:
     """Speeds of the shapes of one result, for quantities relative to the largest value on each shape or, `by_run`, of all."""
 
-    def __init__(self, shapes):
+    def __init__(self, shapes, unit="", rate=1.0):
         self.shapes, self.by_run = shapes, False
+        self.unit, self.rounding = unit, ROUNDING * rate  # of speeds; `rate`: of one length per unit of time of the case
         self.fastest = max((shape.speed for shape in shapes), default=0.0)
 
     def still(self, shape):
-        return shape.speed <= max(STILL * self.fastest, ROUNDING * shape.size)
+        return shape.speed <= max(STILL * self.fastest, self.rounding * shape.size)
 
     def largest(self, name, shape):
         """The largest |u_n| or |u_t|; 0 where nothing moves."""
@@ -53,9 +54,10 @@ class Motion:
     def words(self, shape):
         """The caption below the picture."""
         found = {"u_n": self.largest("u_n", shape), "u_t": self.largest("u_t", shape), "u_theta": shape.largest("u_theta")}
-        if not any(found.values()) and shape.speed > ROUNDING * shape.size:
-            return f"|u| \u2264 {power(shape.speed, 2)}"
-        return "\n".join(f"|{SYMBOLS[name]}| \u2264 {power(value, 2)}" for name, value in found.items() if value) or "at rest"
+        if not any(found.values()) and shape.speed > self.rounding * shape.size:
+            found = {"u": shape.speed}
+        lines = (f"|{SYMBOLS.get(name, name)}| \u2264 {power(value, 2)} {self.unit}".rstrip() for name, value in found.items() if value)
+        return "\n".join(lines) or "at rest"
 
 
 def surface_arrows(samples, velocity, spacing):

@@ -12,7 +12,7 @@ LONGEST_LABEL = 200  # characters: more than is to be read in a picture
 MAX_DIFFERENCES = 4  # cases with more differences are labelled by their names
 
 # Never a label: descriptions and expectations of a case, and times, which are visible.
-IGNORED = ("about.", "expect.", "time.")
+IGNORED = ("about.", "units.", "expect.", "time.")
 NAMES = {
     "tier": "tier",
     "accuracy.energy": "accuracy",
@@ -116,6 +116,16 @@ def power(value, digits):
     if -4 < int(exponent) < 4:
         return number(float(text))
     return f"{number(float(mantissa))}\u00b710" + formula(f"^{{{int(exponent)}}}")
+
+
+def pretty_unit(name):
+    """um, 1/nm^2 with a real \u00b5 and superscripts."""
+    return formula(re.sub(r"\bu(?=[msN])", "\u00b5", name))
+
+
+def in_unit(words, unit):
+    """A quantity, and the unit of its numbers if they have one."""
+    return f"{words} [{unit}]" if unit else words
 
 
 def wrapped(words, width):

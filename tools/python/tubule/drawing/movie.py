@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from . import raster
 from .colours import colours_of, draw_bar
 from .command_line import Unavailable, say
-from .labels import symbol
+from .labels import in_unit, symbol
 from .results import BadInput, Surface
 from .style import draw_scale_bar, few_ticks, line_colours, time_text
 from .surfaces import node_areas
@@ -92,7 +92,7 @@ class Stage:
         extent = left, left + self.pixels[0] / DPI, bottom, bottom + self.pixels[1] / DPI
         self.image = axes.imshow(np.zeros((2, 2, 4), np.uint8), extent=extent, interpolation="none", aspect="auto")
         axes.set(xlim=(0, SIZE[0]), ylim=(0, SIZE[1]))  # imshow changes them
-        draw_scale_bar(axes, BOX[0] + BOX[2] + 0.05, BOX[1], (self.high - self.low)[1] / 3, self.scale)
+        draw_scale_bar(axes, BOX[0] + BOX[2] + 0.05, BOX[1], (self.high - self.low)[1] / 3, self.scale, self.result.unit("length"))
         self.words = axes.text(BOX[0], SIZE[1] - 0.45, "", va="top", fontsize=9)
 
     def _x(self, frame):
@@ -113,7 +113,8 @@ class Stage:
         for x, y in zip(np.split(series[key], ends), np.split(series["energy"], ends)):
             axes.plot(x, y, color=line_colours(1)[0])
         few_ticks(axes.xaxis, 2.4, 0.6)  # numbers of small times are long
-        axes.set(xlabel=self.name if parameter else "time t", ylabel="energy E")
+        x = in_unit(self.name, self.result.parameter_unit) if parameter else in_unit("time t", self.result.unit("time"))
+        axes.set(xlabel=x, ylabel=in_unit("energy E", self.result.unit("energy")))
         (self.dot,) = axes.plot([], [], "o", color="C3", markersize=6)
         self.energy = np.asarray(series[key]), np.asarray(series["energy"])
 
@@ -128,7 +129,8 @@ class Stage:
         )  # fmt: skip
         there = np.isfinite(samples.depth)
         self.image.set_data(raster.shaded(samples, self.colours.rgb(samples.values[there, 0])))
-        self.words.set_text(f"{self.name} = {time_text(self._x(frame))}")
+        unit = self.result.unit("time") if frame.parameter is None else self.result.parameter_unit
+        self.words.set_text(f"{self.name} = {time_text(self._x(frame), unit)}")
         if self.dot:
             x, energy = self.energy
             nearest = int(np.argmin(np.abs(x - self._x(frame))))

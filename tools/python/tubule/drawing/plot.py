@@ -7,13 +7,13 @@ from operator import attrgetter
 
 from matplotlib.figure import Figure
 
-from . import command_line, scan, style
+from . import command_line, scan, style, units
 from .colours import bars_height
 from .curves import CurvePanel
 from .cuts import CutPanel
 from .energy import BranchPanel, EnergyPanel
 from .labels import as_label, row_labels, sorted_by_value
-from .results import BadInput, read_result
+from .results import BadInput
 from .series import BalancePanel, Choice, SeriesPanel, has_balance
 from .surfaces import SurfacePanel, choose_colours
 from .tubes import TubePanel, check_quantities, choose_columns
@@ -38,6 +38,7 @@ class Page:
 
     def __init__(self, results, labels, options):
         self.results, self.labels, self.options = results, labels, options
+        self.times = [time * results[0].scale("time") for time in options.times]  # they are those of the files
         self.marked = []
 
     def wants(self, kind):
@@ -46,7 +47,7 @@ class Page:
     def profiles(self):
         if not any(r.frames for r in self.results):
             return
-        columns = choose_columns(self.results, self.options.times)
+        columns = choose_columns(self.results, self.times)
         self.marked = [column.time for column in columns if column.time is not None]
         if self.wants("profiles"):
             shown = [frame for column in columns for frame in column.cells if frame]
@@ -61,7 +62,7 @@ class Page:
         if not shown:
             return
         results, labels = zip(*shown)
-        columns = choose_columns(results, self.options.times, attrgetter("surfaces"))
+        columns = choose_columns(results, self.times, attrgetter("surfaces"))
         self.marked = self.marked or [column.time for column in columns if column.time is not None]
         if self.wants("surface"):
             yield SurfacePanel(results, labels, columns, choose_colours(results, self.options.colour), self.options.camera)
@@ -77,7 +78,8 @@ class Page:
             equilibria = [i for i in shown if self.results[i].is_equilibrium]
             runs = [i for i in shown if i not in equilibria]
             if runs:
-                yield EnergyPanel(*self._of(runs), self.marked, (self.options.low, self.options.high, self.options.logx))
+                low, high = (end and end * self.results[0].scale("time") for end in (self.options.low, self.options.high))
+                yield EnergyPanel(*self._of(runs), self.marked, (low, high, self.options.logx))
             if equilibria:
                 yield BranchPanel(*self._of(equilibria), self.marked)
         if self.wants("balance"):
@@ -99,6 +101,7 @@ def figure_of(results, options):
     """Decides what can be drawn of the results and lays the panels out from top to bottom."""
     if not results:
         raise BadInput("no result to draw")
+    units.in_common(results)
     if not options.label:
         results = [results[i] for i in sorted_by_value([r.case for r in results])]
     names = [as_label(os.path.splitext(os.path.basename(result.path))[0]) for result in results]
@@ -141,11 +144,11 @@ def draw_movie(options):
     if len(paths) > 1 or scan.is_scan(paths[0]):
         raise BadInput(f"{paths[0]}: --movie shows one result, and no scan")
     if options.series or options.kind != ["all"] or options.output or len(options.colour) > 1 or options.dpi != style.DPI or options.width != style.WIDTH:
-        raise BadInput("--movie goes with --times, --label, --fps, --camera and one --colour only")
-    result = read_result(paths[0])
+        raise BadInput("--movie goes with --times, --label, --fps, --camera, --units and one --colour only")
+    result = units.read(paths[0], options.units)
     frames = result.surfaces or result.frames
     if options.times:
-        columns = choose_columns([result], options.times, attrgetter("surfaces" if result.surfaces else "frames"))
+        columns = choose_columns([result], [time * result.scale("time") for time in options.times], attrgetter("surfaces" if result.surfaces else "frames"))
         frames = [column.cells[0] for column in columns if column.cells[0]]
     title = as_label(options.label[0]) if options.label else result.title
     movie.draw(result, frames, options.movie, (options.colour or ["H"])[0], title, options.fps, options.camera)
@@ -157,10 +160,10 @@ def draw_any(options, outputs):
         for option in ("confirmed", "quantity", "slice"):
             if getattr(options, option):
                 raise BadInput(f"{options.results[0]}: is no scan, to which --{option} belongs")
-        style.save(figure_of([read_result(path) for path in options.results], options), outputs)
+        style.save(figure_of([units.read(path, options.units) for path in options.results], options), outputs)
         return
-    if len(options.results) > 1 or options.times or options.colour or options.kind != ["all"] or options.series:
-        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind and --series")
+    if len(options.results) > 1 or options.times or options.colour or options.kind != ["all"] or options.series or options.units:
+        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind, --series and --units")
     style.save(scan.figure_of(options.results[0], options.quantity, options.slice, options.confirmed), outputs)
 
 

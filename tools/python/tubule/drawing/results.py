@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from .command_line import BadInput
-from .labels import as_label, flatten
+from .labels import as_label, flatten, pretty_unit
 from .triangles import join_periods
 
 
@@ -127,6 +127,21 @@ class Result:
     surfaces: list  # of Surface, likewise
     meanings: dict = field(default_factory=dict)  # name -> what the series is
     term_labels: dict = field(default_factory=dict)  # "20" -> the formula of an energy term; missing in older files
+    dimensions: dict = field(default_factory=dict)  # name -> of the series, as in docs/results.md
+    units: dict = field(default_factory=dict)  # of these numbers, by their dimensions: units.py; none: as in the file
+
+    def scale(self, of):
+        """A number of the file times this is one of the result; `of`: its dimensions."""
+        return self.units[of]["scale"] if of in self.units else 1.0
+
+    def unit(self, of):
+        """The unit of numbers with these dimensions; "" where there is none."""
+        return pretty_unit(self.units[of]["unit"]) if of in self.units else ""
+
+    @property
+    def parameter_unit(self):
+        """Of the parameter of its branch."""
+        return self.unit(self.dimensions.get("parameter", ""))
 
     @property
     def title(self):
@@ -136,7 +151,7 @@ class Result:
     def H0(self):
         """Spontaneous curvature; none where it varies over the membrane."""
         given = flatten(self.case).get("energy.H0", 0.0)
-        return None if isinstance(given, str) else float(given)
+        return None if isinstance(given, str) else float(given) * self.scale("1/length")
 
     @property
     def moves(self):
@@ -251,9 +266,9 @@ def read_result(path, name=""):
         group = file.get("series", {})
         names = [_plain(name) for name in group.attrs.get("order", group)] if group else []
         series = {name: finite_values(group[name]) for name in names}
-        texts = {key: {name: str(_plain(group[name].attrs[key])) for name in names if key in group[name].attrs} for key in ("meaning", "label")}
+        texts = {key: {name: str(_plain(group[name].attrs[key])) for name in names if key in group[name].attrs} for key in ("meaning", "label", "unit")}
         labels = {name.removeprefix("energy_"): label for name, label in texts["label"].items()}
-        return Result(name or path, _case(path, file), about, series_in_time(series), *_frames(path, file), texts["meaning"], labels)
+        return Result(name or path, _case(path, file), about, series_in_time(series), *_frames(path, file), texts["meaning"], labels, texts["unit"])
 
 
 def _case(path, file):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.lines import Line2D
 
-from .labels import number
+from .labels import in_unit, number
 from .results import BadInput
 from .style import DASHES, Legend, axes_at, line_colours, result_handles
 
@@ -20,9 +20,14 @@ def meanings(results):
     return {name: text for result in results for name, text in result.meanings.items()}
 
 
+def units_of_series(results):
+    return {name: result.unit(of) for result in results for name, of in result.dimensions.items()}
+
+
 @dataclass
 class Choice:
-    """What is drawn: the series `names` against the series `x`, where x is between `low` and `high` (None: no limit)."""
+    """What is drawn: the series `names` against the series `x`, where x is between `low` and `high` (None: no limit), numbers
+    of the file."""
 
     names: list
     x: str = "time"
@@ -39,9 +44,10 @@ class Choice:
                 hint = f"; did you mean {' or '.join(near)}?" if near else ""
                 raise BadInput(f"{result.path}: has no series {wanted}; it has {', '.join(sorted(result.series)) or 'none'}{hint}")
         x, y = result.series[self.x], result.series[name]
-        inside = (x >= (-np.inf if self.low is None else self.low)) & (x <= (np.inf if self.high is None else self.high))
+        one = result.scale(result.dimensions.get(self.x, ""))
+        inside = (x >= (-np.inf if self.low is None else self.low * one)) & (x <= (np.inf if self.high is None else self.high * one))
         if not inside.any():
-            raise BadInput(f"{result.path}: no row has a {self.x} in the range; it goes from {number(x.min())} to {number(x.max())}")
+            raise BadInput(f"{result.path}: no row has a {self.x} in the range; it goes from {number(x.min() / one)} to {number(x.max() / one)}")
         if self.logx:
             inside &= x > 0
             if not inside.any():
@@ -58,6 +64,7 @@ class SeriesPanel:
 
     def __init__(self, results, labels, choice):
         self.labels, self.choice, self.meanings = labels, choice, meanings(results)
+        self.units = units_of_series(results)
         self.lines = [[choice.of(result, name) for name in choice.names] for result in results]
         names, dashes = choice.names, ("-", *DASHES * len(choice.names))
         handles = result_handles(labels)
@@ -67,7 +74,7 @@ class SeriesPanel:
         self.height = HEIGHT + 0.62 + self.legend.below
 
     def _name(self, name):
-        return "time t" if name == "time" else self.meanings.get(name, name)
+        return in_unit("time t" if name == "time" else self.meanings.get(name, name), self.units.get(name, ""))
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
@@ -110,15 +117,16 @@ class BalancePanel:
         self.results, self.labels, self.times = results, labels, times
         present = [name for name in BALANCE if any(magnitude(result, name) for result in results)]
         self.styles = dict(zip(present, ("-", *DASHES)))
-        shade, names = line_colours(1)[0] if len(results) == 1 else "0.3", meanings(results)
-        lines = [Line2D([], [], color=shade, linestyle=dashes, label=names[name].split(", ")[0]) for name, dashes in self.styles.items()]
+        shade, names, units = line_colours(1)[0] if len(results) == 1 else "0.3", meanings(results), units_of_series(results)
+        words = {name: in_unit(names[name].split(", ")[0], units.get(name, "")) for name in present}
+        lines = [Line2D([], [], color=shade, linestyle=dashes, label=words[name]) for name, dashes in self.styles.items()]
         self.legend = Legend(result_handles(labels) + lines)
         self.height = BALANCE_HEIGHT + 0.55 + self.legend.below
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
         axes = axes_at(figure, 0.5, bottom + self.legend.below + 0.38, figure.get_figwidth() - 0.6 - (self.legend.right or 0.1), BALANCE_HEIGHT)
-        axes.set(xscale="log", yscale="log", xlabel="time t")
+        axes.set(xscale="log", yscale="log", xlabel=in_unit("time t", self.results[0].unit("time")))
         largest = 0.0
         for result, colour in zip(self.results, line_colours(len(self.results))):
             for name, dashes in self.styles.items():

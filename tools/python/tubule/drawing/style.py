@@ -129,20 +129,20 @@ def time_name(index):
     return formula(f"t_{{{index}}}")
 
 
-def time_text(time):
-    return number(float(f"{time:.4g}"))
+def time_text(time, unit=""):
+    return f"{number(float(f'{time:.4g}'))} {unit}".rstrip()
 
 
-def time_title(index, time):
+def time_title(index, time, unit=""):
     """The words above the shapes at this time; None: above the last ones, each at its own time."""
-    return "last state" if time is None else f"{time_name(index)} = {time_text(time)}"
+    return "last state" if time is None else f"{time_name(index)} = {time_text(time, unit)}"
 
 
-def draw_scale_bar(axes, x, y, length, scale):
+def draw_scale_bar(axes, x, y, length, scale, unit=""):
     """An upright bar of about this length, rounded to one digit, above (x, y); `scale` inches per unit of length."""
     bar = float(f"{length:.0e}")
     axes.plot([x, x], [y, y + scale * bar], color="0.1", linewidth=1.0, solid_capstyle="butt")
-    axes.text(x + 0.05, y + scale * bar / 2, number(bar), ha="left", va="center", fontsize=7)
+    axes.text(x + 0.05, y + scale * bar / 2, f"{number(bar)} {unit}".rstrip(), ha="left", va="center", fontsize=7)
 
 
 def check_outputs(paths):

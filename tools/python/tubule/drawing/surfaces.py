@@ -74,7 +74,7 @@ class SurfacePanel(ShapesPanel):
         self.view = raster.View(*camera)
         shown = [(row, surface) for column in columns for row, surface in enumerate(column.cells) if surface]
         self.quantities = quantities(names, results, [surface for _, surface in shown])
-        motions = [flow.Motion(result.surfaces) for result in results]
+        motions = [flow.Motion(result.surfaces, result.unit("length/time"), result.scale("1/time")) for result in results]
         self.motions = {id(surface): motions[row] for row, surface in shown}
         self.velocity = "u_n" in names
         self.arrows = self.velocity and any(motions[row].largest("u_t", surface) for row, surface in shown)

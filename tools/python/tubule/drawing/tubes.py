@@ -88,8 +88,9 @@ def choose_columns(results, times=None, frames_of=attrgetter("frames")):
         available = sorted({f.time for r in results for f in frames_of(r)})
         for time in times:
             if not any(same_time(time, other, span) for other in available):
-                known = ", ".join(time_text(t) for t in available[:12]) + (", ..." if len(available) > 12 else "")
-                raise BadInput(f"--times: no result has a frame at t = {number(time)}; there are frames at {known}")
+                unit = results[0].scale("time")  # asked for are times of the files
+                known = ", ".join(time_text(t / unit) for t in available[:12]) + (", ..." if len(available) > 12 else "")
+                raise BadInput(f"--times: no result has a frame at t = {number(time / unit)}; there are frames at {known}")
         candidates = sorted(set(times))
     elif len(candidates) > (most := MAX_COLUMNS_NARROW if style.is_narrow() else MAX_COLUMNS):
         candidates = [candidates[i] for i in spread_over_change(candidates, results, most)]
@@ -110,14 +111,15 @@ def choose_columns(results, times=None, frames_of=attrgetter("frames")):
     return columns + ([last] if any(last.cells) else [])
 
 
-def caption(column, row, numbered=False):
+def caption(column, row, result):
     """Why the run of a row ended with the frame in this column, and when unless the column's header says it, or
     frames have numbers in place of times."""
     stop, frame = column.stops[row], column.cells[row]
+    time = time_text(frame.time, result.unit("time")) if frame else ""
     if not stop:
-        return f"t = {time_text(frame.time)}" if frame and column.time is None and not numbered else ""
+        return f"t = {time}" if frame and column.time is None and not result.is_equilibrium else ""
     shown = column.time is not None and same_time(frame.time, column.time, frame.time)
-    return stop if shown or numbered else f"{stop}\nt = {time_text(frame.time)}"
+    return stop if shown or result.is_equilibrium else f"{stop}\nt = {time}"
 
 
 def ring_areas(frame):
@@ -184,11 +186,11 @@ class ShapesPanel:
     def _title(self, index, column):
         if column.time is not None and all(result.is_equilibrium for result in self.results):
             return f"shape {number(column.time)}" if len(self.columns) > 1 else ""
-        return time_title(index, column.time)
+        return time_title(index, column.time, self.results[0].unit("time"))
 
     def _words(self, column, row):
         """Below the shape of that row and column."""
-        return caption(column, row)
+        return caption(column, row, self.results[row])
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
@@ -211,7 +213,7 @@ class ShapesPanel:
             axes.text(0.1, y, label, ha="left", va="center", linespacing=1.25)
         right = self.centres[-1] + self.widths[-1] / 2 + self.MARGIN
         low = top - self.middles[-1] - self.scale * self.lengths[-1] / 2
-        draw_scale_bar(axes, right + 0.14, low, self.BAR * max(self.lengths), self.scale)
+        draw_scale_bar(axes, right + 0.14, low, self.BAR * max(self.lengths), self.scale, self.results[0].unit("length"))
         return axes
 
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from . import command_line, flow, raster, scan
 from .colours import Colours
 from .labels import as_label, flatten, symbol
-from .movie import colours_of
+from .movie import shared_colours
 from .raster import lattice
 from .results import BadInput, Surface, opened, read_result
 from .tubes import choose_columns
@@ -82,7 +82,7 @@ def colour_table(name):
 def field_colours(name, values, result, printed):
     """As `tubule plot` draws them: the scale of H, K and p is from the frames that it draws, others from all."""
     if name in ("H", "K", "p"):
-        return colours_of(result, printed, name)
+        return shared_colours(result, printed, name)
     if name == "energy_density":
         low, high = np.percentile(values, [OUTLIERS, 100 - OUTLIERS])
         half = 0.0 if high > low else 0.5
@@ -165,7 +165,7 @@ def run_page(path):
         "series": {name: finite(values) for name, values in result.series.items() if name != "wall_seconds"},
         "meanings": result.meanings,
         "view": raster.View().axes.T.tolist(),
-        "light": raster.LIGHT.tolist(),
+        "rim": raster.RIM_SHADE,
         "fields": fields,
         **packed_shapes(shapes, fields),
     }

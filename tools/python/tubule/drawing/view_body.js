@@ -1,4 +1,4 @@
-// A surface that turns under the mouse or a finger, drawn by WebGL 2 with the light and colours of `tubule plot`.
+// A surface that turns under the mouse or a finger, drawn by WebGL 2 with the colours of `tubule plot`.
 
 const around = 96;  // points around the axis of a surface of revolution
 
@@ -19,15 +19,13 @@ precision highp float;
 in vec3 across;
 in float part;
 uniform sampler2D colours;
-uniform vec3 light;
+uniform float rim;
 uniform bool line;
 out vec4 colour;
 void main() {
   vec3 n = normalize(across) * (gl_FrontFacing ? 1.0 : -1.0), rgb = texture(colours, vec2(part, 0.5)).rgb;
-  float shade = 0.56 + 0.46 * pow((1.0 + dot(n, light)) / 2.0, 1.5);
-  float gloss = 0.3 * pow(max(0.0, dot(n, normalize(light + vec3(0, 0, 1)))), 40.0);
-  rgb = gl_FrontFacing ? rgb * shade : (0.35 * rgb + 0.32) * 0.75 * shade;  // paler inside, and darker
-  if (gl_FrontFacing) rgb += gloss * (1.0 - rgb);
+  rgb = gl_FrontFacing ? rgb : 0.26 * rgb + 0.24;  // paler inside, and darker
+  rgb *= 1.0 - rim * pow(1.0 - clamp(n.z, 0.0, 1.0), 4.0);
   colour = vec4(line ? vec3(0.13) : rgb, 1);
 }`;
 
@@ -199,7 +197,7 @@ class Body {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const at = name => gl.getUniformLocation(this.program, name);
     const [sx, sy] = [2 * this.per_unit / width, 2 * this.per_unit / height];
-    gl.uniformMatrix3fv(at("turn"), true, this.turn.flat()), gl.uniform3fv(at("light"), data.light);
+    gl.uniformMatrix3fv(at("turn"), true, this.turn.flat()), gl.uniform1f(at("rim"), data.rim);
     gl.uniform3f(at("scale"), sx, sy, -0.5 / this.size), gl.uniform3f(at("shift"), sx * pan[0], sy * pan[1], 0);
     for (const offset of this.offsets) {
       gl.uniform3fv(at("offset"), offset), gl.uniform1i(at("line"), 0);
