@@ -456,7 +456,7 @@ class Others(ProgramTest):
         (self.folder / "cases").symlink_to(root / "cases")
         statuses = (root / "docs/command.md").read_text()
         commands = re.findall(r"(?m)^  (\w+) ", self.tubule("--help")[0].split("Subcommands:")[1].split("Exit status")[0])
-        self.assertEqual(len(commands), 12)
+        self.assertEqual(len(commands), 13)
         for command in commands:
             out, _ = self.tubule(command, "--help")
             examples = re.findall(r"(?m)^  (tubule .*)$", out)
