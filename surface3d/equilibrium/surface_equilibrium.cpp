@@ -64,14 +64,20 @@ public:
 
 private:
     // Meshes the shape found last; the initial one where there is none, and where that is nearer than a new mesh of
-    // the old one.
+    // the old one. A mesh that cannot be made coarser for the comparison is replaced in the first round.
     CurvedMesh next_mesh(const MakeMesh& initial, int triangles) const {
-        if (out_.stop == Stop::finished && !settings_.near) {
-            auto finer = remesh(out_.mesh, Eigen::MatrixXd(0, out_.mesh.size()),
-                                {.triangles = triangles, .quality = least_quality});
-            if (auto* found = std::get_if<Remeshed>(&finer)) return std::move(found->mesh);
-        }
-        return scaled_to(initial(triangles), problem_);
+        if (out_.stop == Stop::finished && !settings_.near)
+            if (auto finer = remeshed(out_.mesh, triangles)) return std::move(*finer);
+        CurvedMesh mesh = scaled_to(initial(triangles), problem_);
+        if (rounds_ == 0 && settings_.triangles > 0 && mesh.triangles() > 1.3 * triangles)
+            if (auto coarser = remeshed(mesh, triangles)) return std::move(*coarser);
+        return mesh;
+    }
+
+    static std::optional<CurvedMesh> remeshed(const CurvedMesh& mesh, int triangles) {
+        auto made = remesh(mesh, Eigen::MatrixXd(0, mesh.size()), {.triangles = triangles, .quality = least_quality});
+        if (auto* found = std::get_if<Remeshed>(&made)) return std::move(found->mesh);
+        return {};
     }
 
     void keep(const SurfaceSystem& system, const Eigen::VectorXd& u) {
