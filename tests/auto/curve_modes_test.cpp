@@ -6,8 +6,7 @@
 
 #include "common/shapes/perturbed_curve.hpp"
 
-namespace tubule {
-namespace waved_profile_test {
+namespace tubule::waved_profile_test {
 
 std::vector<double> tabulated(int last, double (*f)(double s)) {
     std::vector<double> out;
@@ -131,5 +130,4 @@ TEST(PerturbedCurve, refusesWhatIsNoMode) {
     EXPECT_THROW(functions_along(surface, {1.0}, {1.0}), std::invalid_argument);
 }
 
-}  // namespace waved_profile_test
-}  // namespace tubule
+}  // namespace tubule::waved_profile_test

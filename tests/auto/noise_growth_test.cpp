@@ -9,8 +9,7 @@
 #include "common/theory/dispersion.hpp"
 #include "tools/auto/waves.hpp"
 
-namespace tubule {
-namespace noise_growth_test {
+namespace tubule::noise_growth_test {
 
 TEST(NoiseGrowth, constantRatesGiveExponentials) {
     NoiseGrowth growth(1e-6, 2);
@@ -108,5 +107,4 @@ TEST(WaveRates, inertiaOnlySlowsWavesThatGrow) {
             }
 }
 
-}  // namespace noise_growth_test
-}  // namespace tubule
+}  // namespace tubule::noise_growth_test

@@ -8,8 +8,7 @@
 #include "common/theory/dispersion.hpp"
 #include "tools/auto/waves.hpp"
 
-namespace tubule {
-namespace wave_rates_test {
+namespace tubule::wave_rates_test {
 
 constexpr double length = 9, time = 0.5;
 
@@ -79,5 +78,4 @@ TEST(WaveRates, UnderTensionPressureAndForce) {
     }
 }
 
-}  // namespace wave_rates_test
-}  // namespace tubule
+}  // namespace tubule::wave_rates_test

@@ -11,8 +11,7 @@
 #include "common/shapes/torus.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace admissible_test {
+namespace tubule::axisym::admissible_test {
 
 TEST(ShapeIntegrals, areThoseOfClosedForms) {
     // Capsule: H = -1/r on the cylinder of length l, -2/r on the spheres. Torus: INT H^2 and INT K^2 by theory.md
@@ -119,5 +118,4 @@ TEST(Admissible, aMeshThatCannotFollowIsAFailureAtTheBeginning) {
     expect_rows_that_the_flow_allows(c, o);
 }
 
-}  // namespace admissible_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::admissible_test

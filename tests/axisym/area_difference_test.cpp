@@ -15,8 +15,7 @@
 #include "tests/axisym/runs.hpp"
 #include "tests/support/random_vector.hpp"
 
-namespace tubule::axisym {
-namespace area_difference_test {
+namespace tubule::axisym::area_difference_test {
 
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
@@ -365,5 +364,4 @@ TEST(AreaDifference, aTubeFollowsItsForce) {
     }
 }
 
-}  // namespace area_difference_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::area_difference_test

@@ -9,8 +9,7 @@
 #include "tests/axisym/reference.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace convergence_test {
+namespace tubule::axisym::convergence_test {
 
 const TubeMode figure_mode{0.25, 1, 0, -pi / 2};  // 0.25 sin(pi z)
 
@@ -119,5 +118,4 @@ TEST(Symmetry, runsAgreeWithThoseOfTheWholePeriod) {
     }
 }
 
-}  // namespace convergence_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::convergence_test

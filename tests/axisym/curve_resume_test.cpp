@@ -5,8 +5,7 @@
 #include "common/case/read.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace curve_resume_test {
+namespace tubule::axisym::curve_resume_test {
 
 // A prolate spheroid with sharp poles: three pairs of runs for 1e-4, where every pair is left by its error alone.
 Case sharp(const std::string& model) {
@@ -113,5 +112,4 @@ TEST(CurveResume, aLaterEndHasAKnownError) {
     }
 }
 
-}  // namespace curve_resume_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::curve_resume_test

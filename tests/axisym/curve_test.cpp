@@ -14,8 +14,7 @@
 #include "tests/support/message_of.hpp"
 #include "tests/support/random_vector.hpp"
 
-namespace tubule::axisym {
-namespace curve_test {
+namespace tubule::axisym::curve_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -335,5 +334,4 @@ TEST(CurveStart, refusals) {
               "the curve does not have the topology or the period of its space");
 }
 
-}  // namespace curve_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::curve_test

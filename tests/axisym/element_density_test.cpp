@@ -9,8 +9,7 @@
 #include "common/case/read.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace element_density_test {
+namespace tubule::axisym::element_density_test {
 
 std::vector<double> sizes(const std::vector<double>& breaks) {
     std::vector<double> out;
@@ -72,5 +71,4 @@ TEST(MeshNeed, leavesAFineMeshAsItIs) {
     EXPECT_NEAR(o.last("r_min"), 0.4444188369, 1e-6);
 }
 
-}  // namespace element_density_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::element_density_test

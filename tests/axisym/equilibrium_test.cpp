@@ -14,8 +14,7 @@
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule::axisym {
-namespace equilibrium_test {
+namespace tubule::axisym::equilibrium_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -212,7 +211,7 @@ TEST(Equilibrium, saysThatItsStabilityIsUndetermined) {
     const auto problem = at_area_and_volume(bending(1, -2.8), 4 * pi, 0.77 * 4 * pi / 3);
     const auto e = find_equilibrium(problem, pear(0.77), settings);
     EXPECT_EQ(e.stop, Stop::resolution_lost);
-    EXPECT_NE(e.message.find("undetermined"), std::string::npos) << e.message;
+    EXPECT_CONTAINS(e.message, "undetermined");
 }
 
 TEST(Equilibrium, saysThatANeckCloses) {
@@ -548,5 +547,4 @@ TEST(Measures, selfIntersection) {
     EXPECT_EQ((*axis)[0], (*axis)[1]);
 }
 
-}  // namespace equilibrium_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::equilibrium_test

@@ -12,8 +12,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace estimate_test {
+namespace tubule::axisym::estimate_test {
 
 // A tube with 1 ... 4 modes of random waves, amplitudes and phases, random moduli with or without k40 and k42, a random
 // spontaneous curvature, a random time (around that in which a wave of the period decays) and a random accuracy.
@@ -108,5 +107,4 @@ TEST(EstimateStudy, isHonest) {
     for (const Honesty& h : d.all) EXPECT_LE(h.error, h.asked);
 }
 
-}  // namespace estimate_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::estimate_test

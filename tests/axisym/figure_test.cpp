@@ -7,8 +7,7 @@
 #include "tests/axisym/reference.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace figure_test {
+namespace tubule::axisym::figure_test {
 
 class Figure : public testing::TestWithParam<double> {};
 
@@ -59,5 +58,4 @@ TEST(ReferenceEnergy, isThatOfTheDesign) {
     EXPECT_NEAR(run_case(c).summary.reference_energy, expected, 1e-4 * expected);
 }
 
-}  // namespace figure_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::figure_test

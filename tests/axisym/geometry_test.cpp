@@ -6,8 +6,7 @@
 #include "common/energy/bending.hpp"
 #include "common/geometry/profile_point.hpp"
 
-namespace tubule {
-namespace geometry_test {
+namespace tubule::geometry_test {
 
 struct Curve {
     double r, r1, r2, z1, z2;
@@ -178,5 +177,4 @@ TEST(CurvatureJet, productsMix) {
     EXPECT_NEAR(g.K, -1, 1e-15);
 }
 
-}  // namespace geometry_test
-}  // namespace tubule
+}  // namespace tubule::geometry_test

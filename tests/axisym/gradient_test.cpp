@@ -17,8 +17,7 @@
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule::axisym {
-namespace gradient_test {
+namespace tubule::axisym::gradient_test {
 
 Bending with_gradients(Bending energy, double kg) {
     energy.kg = kg;
@@ -215,8 +214,7 @@ TEST(Gradients, unresolvedWavesStopARun) {
         c.discretisation.parametrisation = how;
         const Outcome o = run_case(c);
         EXPECT_EQ(o.summary.stop.reason, Stop::resolution_lost);
-        EXPECT_NE(o.summary.stop.message.find("which only the gradient term damps waves"), std::string::npos)
-            << o.summary.stop.message;
+        EXPECT_CONTAINS(o.summary.stop.message, "which only the gradient term damps waves");
     }
 }
 
@@ -268,13 +266,13 @@ TEST(Gradients, smoothCapsules) {
                          "0.2\n[model]\nkind = \"stokes\"\n[time]\nend = 0.01\n[accuracy]\nenergy = 1e-4\n"));
     ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
     EXPECT_LT(o.last("energy_kg"), o["energy_kg"].front());
-    EXPECT_NE(
+    EXPECT_CONTAINS(
         test::message_of([] {
             case_of(
                 "tier = \"axisym\"\n[energy]\nk20 = 1\n[shape]\nkind = \"capsule\"\nradius = 0.5\nlength = 2\nsmooth = "
                 "0.3\n[time]\nend = 1\n");
-        }).find("shape.smooth must be at most half of shape.radius"),
-        std::string::npos);
+        }),
+        "shape.smooth must be at most half of shape.radius");
 }
 
 // A frame of a result begins a run with the gradient term; one of a patch is refused.
@@ -294,11 +292,8 @@ TEST(Gradients, framesAsInitialShapes) {
     const Outcome o = begun(head + "kind = \"ellipsoid\"\na = 1\nb = 1\nc = 1.4\n", "");
     EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
     EXPECT_GT(o.last("energy_kg"), 0.1);
-    EXPECT_NE(test::message_of([&] {
-                  begun(head + "kind = \"patch\"\nradius = 1\nheight = 0.3\n", "");
-              }).find("energy.kg must be 0 where the shape is a patch"),
-              std::string::npos);
+    EXPECT_CONTAINS(test::message_of([&] { begun(head + "kind = \"patch\"\nradius = 1\nheight = 0.3\n", ""); }),
+                    "energy.kg must be 0 where the shape is a patch");
 }
 
-}  // namespace gradient_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::gradient_test

@@ -7,8 +7,7 @@
 #include "common/theory/dispersion.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace growth_test {
+namespace tubule::axisym::growth_test {
 
 struct Material {
     double k20, H0, k40, k42;
@@ -188,5 +187,4 @@ TEST(Drift, withFourthOrderTerm) {
     expect_radius(m, 1, 1, base_at(m, 1, 1, 1).R);
 }
 
-}  // namespace growth_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::growth_test

@@ -8,8 +8,7 @@
 #include "common/run/stall.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace guards_test {
+namespace tubule::axisym::guards_test {
 
 // The last state can be looked at or resumed from, and the rows end with it.
 void expect_saved(const Outcome& o) {
@@ -274,5 +273,4 @@ TEST(CurveGuards, stepsThatLeadNowhere) {
     EXPECT_EQ(steps_until_stop(1e-5, 1e5), 0);    // a thousandth of the time in 100 steps
 }
 
-}  // namespace guards_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::guards_test

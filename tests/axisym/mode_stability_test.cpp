@@ -12,8 +12,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace mode_stability_test {
+namespace tubule::axisym::mode_stability_test {
 
 const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false}, overdamped{.friction = 1};
 
@@ -275,5 +274,4 @@ TEST(ModeStability, axisymmetricModesAgreeWithTheEquilibrium) {
     EXPECT_LT(rates[2], -0.1);
 }
 
-}  // namespace mode_stability_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::mode_stability_test

@@ -12,11 +12,11 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/support/summary_detail.hpp"
 
-namespace tubule::axisym {
-namespace motion_run_test {
+namespace tubule::axisym::motion_run_test {
 
 struct Watch : RunObserver {
     std::vector<std::vector<double>> rows;
@@ -314,7 +314,7 @@ TEST(CurveRun, anErrorThatIsNotKnownIsNotStatedAsSmall) {
     EXPECT_EQ(o.summary.estimated_error, 1);
     EXPECT_FALSE(o.summary.as_accurate_as_asked);
     ASSERT_FALSE(o.summary.warnings.empty());
-    EXPECT_NE(o.summary.warnings[0].find("the error is unknown"), std::string::npos) << o.summary.warnings[0];
+    EXPECT_CONTAINS(o.summary.warnings[0], "the error is unknown");
 }
 
 TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
@@ -361,5 +361,4 @@ TEST(CurveRun, theFluidStartsAsTheOverdampedModelMoves) {
     EXPECT_LE((acceleration - velocity).norm(), 1e-3 * velocity.norm());
 }
 
-}  // namespace motion_run_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::motion_run_test

@@ -10,8 +10,7 @@
 #include "common/solve/derivative_check.hpp"
 #include "tests/support/random_vector.hpp"
 
-namespace tubule::axisym {
-namespace motion_test {
+namespace tubule::axisym::motion_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -202,5 +201,4 @@ TEST(CurveMotion, pressuresAreInfSupStable) {
     EXPECT_GT(inf_sup(graded, some_curve(graded)), 0.1);
 }
 
-}  // namespace motion_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::motion_test

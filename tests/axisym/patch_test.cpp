@@ -17,8 +17,7 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/random_vector.hpp"
 
-namespace tubule::axisym {
-namespace patch_test {
+namespace tubule::axisym::patch_test {
 
 using Vector = Eigen::VectorXd;
 using test::random_vector;
@@ -318,7 +317,7 @@ TEST(Patches, fluidsContinueWithTheirVelocity) {
 
     std::get<ResultFrame>(next.shape).modes = {{.amplitude = 0.1, .l = {}, .n = 2}};
     const std::string message = test::message_of<CaseError>([&] { run_case(next); });
-    EXPECT_NE(message.find("must be absent: modes and noise are those of closed cells"), std::string::npos) << message;
+    EXPECT_CONTAINS(message, "must be absent: modes and noise are those of closed cells");
 }
 
 // What no distance allows ends a run with what to free.
@@ -329,8 +328,7 @@ TEST(Patches, aBeadBeyondAFixedArea) {
         "[accuracy]\nenergy = 1e-3\n[time]\nend = 0.1\n",
         {}, "case.toml"));
     EXPECT_EQ(o.summary.stop.reason, Stop::solver_failed) << o.summary.stop.message;
-    EXPECT_NE(o.summary.stop.advice.find("a fixed area allows only some distances"), std::string::npos)
-        << o.summary.stop.advice;
+    EXPECT_CONTAINS(o.summary.stop.advice, "a fixed area allows only some distances");
 }
 
 TEST(Patches, refusals) {
@@ -342,7 +340,7 @@ TEST(Patches, refusals) {
     };
     const auto says = [&](const std::string& text, const std::vector<std::string>& sets, const std::string& words) {
         const std::string message = refused(text, sets);
-        EXPECT_NE(message.find(words), std::string::npos) << message;
+        EXPECT_CONTAINS(message, words);
     };
     const std::string text = fmt::format(fmt::runtime(moving), "stokes", "hinged") + "[time]\nend = 0.01\n";
     says(text, {"shape.height=0"}, "model.area must leave the area free where the patch is flat: give shape.height");
@@ -359,5 +357,4 @@ TEST(Patches, refusals) {
     says(plate, {"model.bead_width=0.6"}, "must be small beside the shape");
 }
 
-}  // namespace patch_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::patch_test

@@ -5,9 +5,9 @@
 
 #include "tests/axisym/reference.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
 
-namespace tubule::axisym {
-namespace pinch_off_test {
+namespace tubule::axisym::pinch_off_test {
 
 Case neck_case(double amplitude, double end) {
     return tube_case(bending(0.2, -2), 1, 2, {{amplitude, 1}}, end);
@@ -29,7 +29,7 @@ TEST(PinchOff, thresholdsAreCrossedWhenTheReferenceDoes) {
         EXPECT_NEAR(o.summary.energy, crossing.energy, 1e-6 * o.summary.reference_energy);  // at a time off by 1e-5
         EXPECT_LE(o.summary.estimated_error, 1e-7);
         EXPECT_TRUE(o.summary.as_accurate_as_asked);
-        EXPECT_NE(o.summary.stop.message.find("at z = 1"), std::string::npos) << o.summary.stop.message;
+        EXPECT_CONTAINS(o.summary.stop.message, "at z = 1");
     }
 }
 
@@ -69,5 +69,4 @@ TEST(PinchOff, criticalAmplitudeIsBetween) {
     }
 }
 
-}  // namespace pinch_off_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::pinch_off_test

@@ -13,8 +13,7 @@
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule::axisym {
-namespace potential_test {
+namespace tubule::axisym::potential_test {
 
 using Kind = Potential::Kind;
 using Law = Potential::Law;
@@ -206,9 +205,8 @@ TEST(Potential, wallsAreNotPassed) {
         for (const double E : o["energy"]) EXPECT_TRUE(std::isfinite(E));
         return o.summary.stop.message;
     };
-    EXPECT_NE(stopped("kind = \"plane\"\nz = -1.2\nstrength = 0.1\nrange = 0.1").find("behind the wall"),
-              std::string::npos);
-    EXPECT_NE(stopped("kind = \"formula\"\nformula = \"0.1*sqrt(z + 1.3)\"").find("hardly defined"), std::string::npos);
+    EXPECT_CONTAINS(stopped("kind = \"plane\"\nz = -1.2\nstrength = 0.1\nrange = 0.1"), "behind the wall");
+    EXPECT_CONTAINS(stopped("kind = \"formula\"\nformula = \"0.1*sqrt(z + 1.3)\""), "hardly defined");
     const auto begins = [&](const std::vector<std::string>& sets, bool still) {
         std::string text = at_wall;
         if (still) text = text.substr(0, text.find("[model]")) + text.substr(text.find("[shape]"));
@@ -219,18 +217,15 @@ TEST(Potential, wallsAreNotPassed) {
         });
     };
     for (const bool still : {false, true}) {
-        EXPECT_NE(begins({"energy.potential.0.z=-1"}, still).find("a point of it is 0.1 behind one"),
-                  std::string::npos);
+        EXPECT_CONTAINS(begins({"energy.potential.0.z=-1"}, still), "a point of it is 0.1 behind one");
         const std::string formula = "energy.potential=[{kind=\"formula\", formula=\"log(z)\"}]";
-        EXPECT_NE(begins({formula}, still).find("energy.potential must be finite on the initial shape"),
-                  std::string::npos);
+        EXPECT_CONTAINS(begins({formula}, still), "energy.potential must be finite on the initial shape");
     }
-    EXPECT_NE(begins({"shape={kind=\"sphere\", radius=1}"}, false).find("no other shape has these"), std::string::npos);
+    EXPECT_CONTAINS(begins({"shape={kind=\"sphere\", radius=1}"}, false), "no other shape has these");
     const auto refusal = [&](const std::vector<std::string>& sets) {
         return test::message_of<CaseError>([&] { parse_case(at_wall, sets, "case.toml"); });
     };
-    EXPECT_NE(refusal({"energy.potential.0.range=0"}).find("must be a number > 0"), std::string::npos);
+    EXPECT_CONTAINS(refusal({"energy.potential.0.range=0"}), "must be a number > 0");
 }
 
-}  // namespace potential_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::potential_test

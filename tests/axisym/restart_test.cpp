@@ -9,9 +9,9 @@
 #include "common/result/frame_profile.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/missing_fields.hpp"
+#include "tests/support/message_of.hpp"
 
-namespace tubule::axisym {
-namespace restart_test {
+namespace tubule::axisym::restart_test {
 
 Case relaxing(double asked) {
     Case c = tube_case(bending(0.2, -2, 0, 0.06), 1, 2, {{0.25, 1, 0, -pi / 2}, {0.05, 2}}, 0.5, {0.01, 0.05, 0.2});
@@ -92,12 +92,7 @@ TEST(Restart, fromAFrame) {
 TEST(Restart, refusesRecordsOfAnotherKind) {
     const Case c = relaxing(1e-4);
     const auto message = [&](const Record& record) -> std::string {
-        try {
-            run_case(c, &record);
-        } catch (const std::runtime_error& e) {
-            return e.what();
-        }
-        return "accepted";
+        return test::message_of<std::runtime_error>([&] { run_case(c, &record); });
     };
     Record record = run_case(c).log.frames[1];
     EXPECT_EQ(message(record), "accepted");
@@ -169,5 +164,4 @@ TEST(Frame, holdsTheProfileOverThePeriod) {
     }
 }
 
-}  // namespace restart_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::restart_test

@@ -12,9 +12,9 @@
 #include "axisym/splines/band_lu.hpp"
 #include "common/solve/sparse.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
 
-namespace tubule::axisym {
-namespace rosenbrock_test {
+namespace tubule::axisym::rosenbrock_test {
 
 // (1 + y^2) (v - 0.2/y^3) = 0 from y = 1: y = (1 + 0.8 t)^(1/4). Dissipation 1/y, so that INT is (y^3 - 1)/(3 0.2).
 struct Growth {
@@ -95,7 +95,7 @@ TEST(Rosenbrock, refusesToleranceBelowRounding) {
     const Growth growth;
     auto flow = growth.flow(1e-17);
     EXPECT_EQ(flow.advance(1), TimeIntegrator::Outcome::failed);
-    EXPECT_NE(flow.failure().find("too much accuracy"), std::string::npos) << flow.failure();
+    EXPECT_CONTAINS(flow.failure(), "too much accuracy");
 }
 
 // Without k20 and with a zero of H the flow is degenerate, and its linearisation does not see what stiffness appears
@@ -114,7 +114,7 @@ TEST(Rosenbrock, leavesDegenerateFlowsToIda) {
     EXPECT_EQ(detail<std::string>(resumed.summary, "integrator"), "ida");
     EXPECT_EQ(resumed.summary.attempts, mixed.summary.attempts);
     ASSERT_EQ(resumed.summary.warnings.size(), 1U);
-    EXPECT_NE(resumed.summary.warnings[0].find("IDA has integrated the run"), std::string::npos);
+    EXPECT_CONTAINS(resumed.summary.warnings[0], "IDA has integrated the run");
     c.time.integrator = Integrator::ida;
     c.accuracy.energy = 1e-5;
     const Outcome other = run_case(c);
@@ -123,7 +123,7 @@ TEST(Rosenbrock, leavesDegenerateFlowsToIda) {
     EXPECT_GT(mixed.summary.attempts, 1);
     EXPECT_EQ(detail<std::string>(mixed.summary, "integrator"), "ida");
     ASSERT_EQ(mixed.summary.warnings.size(), 1U);
-    EXPECT_NE(mixed.summary.warnings[0].find("IDA has integrated the run"), std::string::npos);
+    EXPECT_CONTAINS(mixed.summary.warnings[0], "IDA has integrated the run");
     EXPECT_LE(mixed.summary.estimated_error, 1e-4);
     EXPECT_NEAR(mixed.summary.energy, other.summary.energy, 1e-4 * mixed.summary.reference_energy);
 }
@@ -179,5 +179,4 @@ TEST(BandLu, refusesSingularMatrices) {
     EXPECT_THROW(lu.factor(A.valuePtr()), SolveError);
 }
 
-}  // namespace rosenbrock_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::rosenbrock_test

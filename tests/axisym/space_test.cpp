@@ -9,10 +9,10 @@
 #include "axisym/splines/spline_space.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/support/random_vector.hpp"
 
-namespace tubule::axisym {
-namespace space_test {
+namespace tubule::axisym::space_test {
 
 using Vector = Eigen::VectorXd;
 
@@ -45,12 +45,9 @@ const Cell periodic{-0.3, 1.7, false, 1}, mirrored{-0.3, 0.7, true, 1};
 
 TEST(SplineSpace, refusesWhatIsNoSpace) {
     const auto message = [](std::vector<double> breaks, int degree, int smoothness) -> std::string {
-        try {
+        return test::message_of<std::invalid_argument>([&] {
             SplineSpace(Cell{0, 1, false, 1}, std::move(breaks), degree, smoothness);
-        } catch (const std::invalid_argument& e) {
-            return e.what();
-        }
-        return "accepted";
+        });
     };
     const std::vector<double> good{0, 0.5, 1};
     EXPECT_EQ(message(good, 5, 4), "accepted");
@@ -372,5 +369,4 @@ TEST(Symmetry, cellIsTheSmallestThatDeterminesTheTube) {
     EXPECT_DOUBLE_EQ(cell({{0.1, 4, 0, 0.3}}).period(), 2);
 }
 
-}  // namespace space_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::space_test

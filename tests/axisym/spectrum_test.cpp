@@ -18,8 +18,7 @@
 #include "common/theory/waves.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace spectrum_test {
+namespace tubule::axisym::spectrum_test {
 
 using theory::UniformSphere;
 using theory::UniformTube;
@@ -281,5 +280,4 @@ TEST(Growth, fittedToAFlowWithFreeVolume) {
     }
 }
 
-}  // namespace spectrum_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::spectrum_test

@@ -169,28 +169,13 @@ class Walls(ProgramTest):
     def test_a_vesicle_at_a_wall_loses_its_axis(self):
         """It goes on in three dimensions with the same energies: the wall is where it was."""
         case = """tier = "auto"
-[energy]
-k20 = 0.5
-[[energy.potential]]
-kind = "plane"
-z = -1.2
-strength = 0.2
-range = 0.4
-[model]
-kind = "gradient-flow"
-area = "fixed"
-volume = "fixed"
-[shape]
-kind = "ellipsoid"
-a = 1.0
-b = 1.0
-c = 0.5
-[auto]
-noise = 3e-3
-[accuracy]
-energy = 1e-2
-[time]
-end = 0.118
+energy = {k20 = 0.5, potential = [{kind = "plane", z = -1.2, strength = 0.2, range = 0.4}]}
+model = {kind = "gradient-flow", area = "fixed", volume = "fixed"}
+shape = {kind = "ellipsoid", a = 1.0, b = 1.0, c = 0.5}
+auto = {noise = 3e-3}
+accuracy = {energy = 1e-2, estimate = false}
+discretisation = {elements = 320, order = 2}
+time = {end = 0.1167}
 """
         result = self.folder / "wall.hdf"
         self.tubule("run", self.write("wall.toml", case), "--quiet", "-o", result)

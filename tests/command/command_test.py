@@ -28,39 +28,21 @@ energy_42 = {value = -7, abs = 1e-3}
 
 # Its seams make waves that few triangles do not resolve.
 ROUGH = """tier = "surface3d"
-[energy]
-k20 = 0.125
-k42 = 0.12
-[model]
-kind = "fluid"
-[shape]
-kind = "capsule"
-radius = 0.5
-length = 1.0
-[accuracy]
-energy = 1e-3
-[time]
-end = 0.005
+energy = {k20 = 0.125, k42 = 0.12}
+model = {kind = "fluid"}
+shape = {kind = "capsule", radius = 0.5, length = 1.0}
+accuracy = {energy = 1e-3}
+time = {end = 0.005}
 """
 
 # Moves in three dimensions: 1 s.
 SURFACE = """tier = "surface3d"
-[energy]
-k20 = 1.0
-[model]
-kind = "overdamped"
-[shape]
-kind = "ellipsoid"
-a = 1.0
-b = 0.9
-c = 0.8
-[accuracy]
-energy = 1e-2
-[discretisation]
-elements = 80
-order = 3
-[time]
-end = 0.02
+energy = {k20 = 1.0}
+model = {kind = "overdamped"}
+shape = {kind = "ellipsoid", a = 1.0, b = 0.9, c = 0.8}
+accuracy = {energy = 1e-2}
+discretisation = {elements = 80, order = 3}
+time = {end = 0.02}
 """
 
 
@@ -160,7 +142,7 @@ class Physics(ProgramTest):
 
     def test_a_balance_that_is_off(self):
         # Waves of the seams are lost on 80 triangles. (A run that estimates its error would make more of them.)
-        case = self.write("case.toml", ROUGH.replace("1e-3", "1e-4").replace("[time]", "estimate = false\n[discretisation]\nelements = 80\norder = 2\n[time]"))
+        case = self.write("case.toml", ROUGH.replace("1e-3}", "1e-4, estimate = false}\ndiscretisation = {elements = 80, order = 2}"))
         out, _ = self.tubule("run", case, "-o", self.result, "--set", "time.end=1e-3")
         defect, reference = np.abs(series(self.result)["identity_defect"]).max(), about(self.result)["E_ref"]
         self.assertGreater(defect, 3e-4 * reference)

@@ -23,24 +23,13 @@ from program import PROGRAM, ProgramTest, study
 # H0 = 0 it stores the area better by flattening, m = 2, which tier 1 cannot see.
 LENGTH, AMPLITUDE = 4.0, 0.1
 CASE = f"""tier = "axisym"
-[energy]
-k20 = 1.0
-[model]
-kind = "overdamped"
-[shape]
-kind = "tube"
-radius = 1.0
-length = {LENGTH}
-[[shape.mode]]
-amplitude = {AMPLITUDE}
-n = 1
-[accuracy]
-energy = 1e-4
-[time]
-end = 0.7
-stationary = 1e-6
+energy = {{k20 = 1.0}}
+model = {{kind = "overdamped"}}
+shape = {{kind = "tube", radius = 1.0, length = {LENGTH}, mode = [{{amplitude = {AMPLITUDE}, n = 1}}]}}
+accuracy = {{energy = 1e-4}}
+time = {{end = 0.7, stationary = 1e-6}}
 """
-FEW = ("--elements", "40")
+FEW, COARSE = ("--elements", "40"), ("--elements", "180")
 X = (2 * math.pi / LENGTH) ** 2  # q^2 of the wave
 
 
@@ -93,7 +82,10 @@ class Confirm(ProgramTest):
         self.assertEqual(point["set"], ["energy.H0=0"])
         self.assertEqual(point["values"]["rate"], float(flattens["rate"]))
 
-    def test_refusals(self):
+        self.assert_refusals()
+
+    def assert_refusals(self):
+        kept = set((self.folder / "scan_confirm").iterdir())
         for words, *arguments in (
             ("--points must be 1 or more, not 0", "--points", "0"),
             ("--elements must be an integer from 20 to 1000000, not 0", "--elements", "0"),
@@ -102,12 +94,12 @@ class Confirm(ProgramTest):
         ):
             self.assertIn(words, self.tubule("confirm", self.scan, *arguments, status=2)[1])
         self.assertIn("not a result of tubule scan", self.tubule("confirm", "case.toml", status=2)[1])
-        self.assertFalse((self.folder / "scan_confirm").exists())
+        self.assertEqual(set((self.folder / "scan_confirm").iterdir()), kept)
 
     @study
     def test_under_a_force(self):
         # Area and volume are kept, the period is free: theory.md (3.22) gives the tension, (5.9) the rate of the ring.
-        self.write("case.toml", CASE.replace('"overdamped"', '"overdamped"\nperiod = "free"')
+        self.write("case.toml", CASE.replace('"overdamped"', '"overdamped", period = "free"')
                    .replace(f"amplitude = {AMPLITUDE}", "amplitude = 0.01").replace("0.7", "1.5"))  # fmt: skip
         pushed, pulled = -3 * math.pi, 3 * math.pi
         self.tubule("scan", "case.toml", "--over", f"model.force={pushed},{pulled}", "-o", self.folder / "force.hdf")
@@ -123,18 +115,10 @@ class Confirm(ProgramTest):
 
 
 VESICLE = """tier = "axisym"
-[energy]
-k20 = 0.5
-[shape]
-kind = "ellipsoid"
-a = 1.0
-b = 1.0
-c = 1.5
-[accuracy]
-energy = 1e-6
-[equilibrium]
-reduced_volume = 0.9
-area = 12.566370614359172
+energy = {k20 = 0.5}
+shape = {kind = "ellipsoid", a = 1.0, b = 1.0, c = 1.5}
+accuracy = {energy = 1e-6}
+equilibrium = {reduced_volume = 0.9, area = 12.566370614359172}
 """
 
 
@@ -143,17 +127,17 @@ class Equilibria(ProgramTest):
         # Oblates above v = 0.7497 are unstable against m = 2: cases/surface_branch_triaxial.toml.
         self.write("vesicle.toml", VESICLE)
         self.tubule("scan", "vesicle.toml", "--over", 'equilibrium.family="prolate","oblate"', "-o", "scan.hdf")
-        out, _ = self.tubule("confirm", "scan.hdf", "--csv", "--quiet", status=1)
+        out, _ = self.tubule("confirm", "scan.hdf", *COARSE, "--csv", "--quiet", status=1)
         prolate, oblate = csv.DictReader(io.StringIO(out))
         self.assertEqual(prolate["set"], 'equilibrium.family="prolate"')
         self.assertEqual((prolate["verdict"], prolate["growing"]), ("agrees", "none"))
         self.assertEqual((oblate["verdict"], oblate["growing"], oblate["axisym_growing"]), ("symmetry-broken", "2", "2"))
         for row in prolate, oblate:
-            self.assertLess(abs(float(row["energy_difference"])), 1e-4)
-            self.assertAlmostEqual(float(row["rate"]) / float(row["axisym_rate"]), 1, delta=0.01)
+            self.assertLess(abs(float(row["energy_difference"])), 1e-3)
+            self.assertAlmostEqual(float(row["rate"]) / float(row["axisym_rate"]), 1, delta=0.03)
         before = {path: path.stat().st_mtime_ns for path in (self.folder / "scan_confirm").glob("*.hdf")}
         self.assertEqual(len(before), 4)
-        self.assertIn("1 of 2 points agree", self.tubule("confirm", "scan.hdf", "--quiet", status=1)[0])
+        self.assertIn("1 of 2 points agree", self.tubule("confirm", "scan.hdf", *COARSE, "--quiet", status=1)[0])
         self.assertEqual({path: path.stat().st_mtime_ns for path in before}, before)
         self.assertIn("--end is for scans of motions", self.tubule("confirm", "scan.hdf", "--end", "1", status=2)[1])
 

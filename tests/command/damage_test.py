@@ -16,7 +16,7 @@ from samples import samples
 from sandbox import Sandbox
 
 PROGRAM = Path(sys.argv[1]).resolve()
-FLIPS = int(sys.argv[2]) if len(sys.argv) > 2 else 8
+FLIPS = int(sys.argv[2]) if len(sys.argv) > 2 else 4
 HEAD = 4096  # where HDF5 has most of its structures
 
 

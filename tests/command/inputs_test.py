@@ -70,7 +70,6 @@ KINDS = {
         AXISYM.format(PROFILE + "H0_tolerance = 1e-2\n"), "input.csv", lambda test, bulge: profile(bulge, 0, True), True),
     "profile in 3D": (SURFACE.format(PROFILE), "input.csv", lambda test, bulge: profile(bulge), True),
     "mesh": (SURFACE.format(MESH), "input.off", lambda test, bulge: octahedron(bulge), True),
-    "large mesh": (SURFACE.format(MESH), "input.off", lambda test, bulge: octahedron(bulge, MANY), False),
     "frame": (AXISYM.format(FRAME), "input.hdf", lambda test, bulge: test.frame(AXISYM, bulge), True),
     "frame in 3D": (SURFACE.format(FRAME), "input.hdf", lambda test, bulge: test.frame(SURFACE, bulge), None),
 }  # fmt: skip
@@ -111,11 +110,10 @@ class Inputs(ProgramTest):
                 goes_on = (["case.toml", "-o", "case.hdf"], ["case.hdf"])
 
                 self.put(name, KINDS[kind][2](self, bulge + dice.choice((-0.1, 0.1))))
-                for what in goes_on:
-                    said = self.tubule("run", *what, "--resume", "--until", "2e-3", status=2)[1]
-                    self.assertIn(f"{name}", said)
-                    self.assertIn("has changed since", said)
-                    self.assertEqual(self.result.read_bytes(), begun)
+                said = self.tubule("run", *dice.choice(goes_on), "--resume", "--until", "2e-3", status=2)[1]
+                self.assertIn(f"{name}", said)
+                self.assertIn("has changed since", said)
+                self.assertEqual(self.result.read_bytes(), begun)
                 said = self.tubule("run", "case.toml", "-o", "case.hdf", status=2)[1]
                 self.assertIn("holds the result of another case", said)
                 self.assertIn("has changed since", said)

@@ -125,21 +125,6 @@ class Kill(ProgramTest):
         self.tubule("run", self.case, "--resume", "--quiet")
         self.assert_ends_like_the_undisturbed_run()
 
-    def test_time_limit_resumes(self):
-        self.write("case.toml", SLOW.replace("[time]", "[time]\nlimit = 0.2"))
-        out, _ = self.tubule("run", self.case, status=5)
-        self.assertIn("time-limit at t = ", out)
-        self.assertIn("continue with --resume", out)
-        for _ in range(1000):
-            times = series(self.result)["time"]
-            with self.start("run", self.case, "--resume") as process:
-                process.communicate()
-            self.assertIn(process.returncode, (0, 5))
-            if process.returncode == 0:
-                break
-            self.assertGreater(series(self.result)["time"][-1], times[-1])
-        self.assert_ends_like_the_undisturbed_run()
-
 
 # A surface that moves, half a second or so, in steps as given: 60 of them and a frame at every fifth.
 SURFACE = """tier = "surface3d"

@@ -19,37 +19,19 @@ LIMIT, ROOM = 0.2, 12  # seconds: what is asked, and when it must have ended on 
 SURFACE = QUICK.replace('tier = "axisym"', 'tier = "surface3d"')
 # Its meridian is found by a search at every point, and its rim asks for many small elements.
 PANCAKE = """tier = "axisym"
-[energy]
-k20 = 1.0
-[model]
-kind = "overdamped"
-[shape]
-kind = "ellipsoid"
-a = 1.0
-b = 1.0
-c = 0.0071
-[accuracy]
-energy = 0.095
-[discretisation]
-elements = 100000
-[time]
-end = 1.0
+energy = {k20 = 1.0}
+model = {kind = "overdamped"}
+shape = {kind = "ellipsoid", a = 1.0, b = 1.0, c = 0.0071}
+accuracy = {energy = 0.095}
+discretisation = {elements = 100000}
+time = {end = 1.0}
 """
 # Area and volume of a shape far from the start, and an accuracy that takes long.
 EQUILIBRIUM = """tier = "axisym"
-[energy]
-k20 = 0.125
-k42 = 0.12
-[shape]
-kind = "ellipsoid"
-a = 0.7
-b = 0.7
-c = 1.7
-[accuracy]
-energy = 1e-9
-[equilibrium]
-area = 14.4
-volume = 0.0024
+energy = {k20 = 0.125, k42 = 0.12}
+shape = {kind = "ellipsoid", a = 0.7, b = 0.7, c = 1.7}
+accuracy = {energy = 1e-9}
+equilibrium = {area = 14.4, volume = 0.0024}
 """
 BRANCH = CAPSULE + 'modes = 2\n[equilibrium.branch]\nvary = "energy.k42"\nto = 0.0\nstep = 0.001\n'
 
@@ -250,7 +232,7 @@ class NoEquilibrium(ProgramTest):
         # The isoperimetric inequality: at most 6^(3/2)/(6 pi^(1/2)) = 1.38198.
         self.fails(
             EQUILIBRIUM.replace("area = 14.4", "area = 6.0").replace("0.0024", "1.4"),
-            "cell.toml:14:10: equilibrium.volume must be at most 1.38198: no shape with this equilibrium.area encloses more",
+            "cell.toml:5:37: equilibrium.volume must be at most 1.38198: no shape with this equilibrium.area encloses more",
             status=2,
         )
 

@@ -37,33 +37,15 @@ output = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]
 FLUID = TUBE.replace("[shape]", '[model]\nkind = "fluid"\nRe = 2.0\ngamma = 0.3\n[shape]')
 # At rest but for a pearling, a buckling and a ring wave, too small to meet each other.
 SURFACE = """tier = "surface3d"
-[energy]
-k20 = 0.5
-H0 = -1.0
-k42 = 0.05
+energy = {k20 = 0.5, H0 = -1.0, k42 = 0.05}
+accuracy = {energy = 1e-2}
+discretisation = {order = 3, step = 0.005}
+time = {end = 0.15, output = [0.015, 0.03, 0.045, 0.06, 0.075, 0.09, 0.105, 0.12, 0.135]}
 [shape]
 kind = "tube"
 radius = 1.0
 length = 3.6275987284684357
-[[shape.mode]]
-amplitude = 1e-3
-n = 1
-[[shape.mode]]
-amplitude = 1e-3
-n = 1
-m = 1
-[[shape.mode]]
-amplitude = 1e-3
-n = 0
-m = 2
-[accuracy]
-energy = 1e-2
-[discretisation]
-order = 3
-step = 0.0025
-[time]
-end = 0.15
-output = [0.015, 0.03, 0.045, 0.06, 0.075, 0.09, 0.105, 0.12, 0.135]
+mode = [{amplitude = 1e-3, n = 1}, {amplitude = 1e-3, n = 1, m = 1}, {amplitude = 1e-3, n = 0, m = 2}]
 """
 
 

@@ -6,12 +6,8 @@ from program import ProgramTest
 
 TETRAHEDRON = "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"
 CASE = """tier = "surface3d"
-[energy]
-k20 = 1.0
-[shape]
-kind = "file"
-path = "body.off"
-remesh = 100
+energy = {k20 = 1.0}
+shape = {kind = "file", path = "body.off", remesh = 100}
 """
 
 

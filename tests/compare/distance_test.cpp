@@ -14,11 +14,11 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
+#include "tests/support/message_of.hpp"
 #include "tools/compare/revolution_surface.hpp"
 #include "tools/compare/triangle_surface.hpp"
 
-namespace tubule::compare {
-namespace distance_test {
+namespace tubule::compare::distance_test {
 
 using Eigen::Vector3d;
 using surface3d::CurvedMesh;
@@ -305,18 +305,12 @@ TEST(Alignment, OfTheOtherTierLeavesTheErrorOfTheMesh) {
 }
 
 TEST(Distance, RefusesWhatCannotBeCompared) {
-    const auto message = [](const Surface& a, const Surface& b) -> std::string {
-        try {
-            distance(a, b);
-        } catch (const std::invalid_argument& error) {
-            return error.what();
-        }
-        return "";
+    const auto message = [](const Surface& a, const Surface& b) {
+        return test::message_of<std::invalid_argument>([&] { distance(a, b); });
     };
     EXPECT_EQ(message(wave(0.1, 2), spheroid(1, 1)), "one is a tube of period 2.000000, the other is a closed surface");
     EXPECT_EQ(message(wave(0.1, 2), wave(0.1, 3)),
               "one is a tube of period 2.000000, the other is a tube of period 3.000000");
 }
 
-}  // namespace distance_test
-}  // namespace tubule::compare
+}  // namespace tubule::compare::distance_test

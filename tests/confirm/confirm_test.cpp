@@ -13,8 +13,7 @@
 #include "tools/confirm/picks.hpp"
 #include "tools/confirm/surface_point.hpp"
 
-namespace tubule::confirm {
-namespace confirm_test {
+namespace tubule::confirm::confirm_test {
 
 // A made-up map of 10 x 10: pinched where i + j < 7, else straight; one point failed.
 std::vector<Outcome> map() {
@@ -66,27 +65,12 @@ TEST(Picks, areAllThereAreIfMoreAreAsked) {
 }
 
 const char* const tube = R"(tier = "axisym"
-[energy]
-k20 = 1.0
-k42 = 4.0
-H0 = -2.0
-[model]
-kind = "overdamped"
-volume = "free"
-[shape]
-kind = "tube"
-radius = 1.0
-length = 12.0
-[[shape.mode]]
-amplitude = 1e-3
-n = 1
-[accuracy]
-r_min = 0.05
-[discretisation]
-elements = 20
-[time]
-end = 5.0
-stationary = 1e-6
+energy = {k20 = 1.0, k42 = 4.0, H0 = -2.0}
+model = {kind = "overdamped", volume = "free"}
+shape = {kind = "tube", radius = 1.0, length = 12.0, mode = [{amplitude = 1e-3, n = 1}]}
+accuracy = {r_min = 0.05}
+discretisation = {elements = 20}
+time = {end = 5.0, stationary = 1e-6}
 )";
 
 PointResult straight() {
@@ -261,5 +245,4 @@ TEST(Confirm, seesAWaveThatGrows) {
     EXPECT_THROW(surface_end(axisymmetric, lost), std::runtime_error);  // it is still going on
 }
 
-}  // namespace confirm_test
-}  // namespace tubule::confirm
+}  // namespace tubule::confirm::confirm_test

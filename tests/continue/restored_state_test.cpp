@@ -13,8 +13,7 @@
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/run.hpp"
 
-namespace tubule {
-namespace restored_state_test {
+namespace tubule::restored_state_test {
 
 // Writes a result, and interrupts the run after so many rows.
 struct Interrupted : RunObserver {
@@ -126,5 +125,4 @@ TEST(RestoredState, ofASurface) {
     EXPECT_TRUE(same_bits(list(restored.state.X.reshaped()), find_array(record, "points")->data));
 }
 
-}  // namespace restored_state_test
-}  // namespace tubule
+}  // namespace tubule::restored_state_test

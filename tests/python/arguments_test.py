@@ -16,7 +16,7 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, sys.argv[1])
-CALLS = int(sys.argv[2]) if len(sys.argv) > 2 else 300
+CALLS = int(sys.argv[2]) if len(sys.argv) > 2 else 150
 SEED = int(sys.argv[3]) if len(sys.argv) > 3 else 36
 
 import matplotlib.figure  # noqa: F401  once, rather than in each process

@@ -6,8 +6,7 @@
 #include "common/case/read.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace extension_test {
+namespace tubule::extension_test {
 
 using test::message_of;
 
@@ -91,8 +90,7 @@ TEST(Extension, Refuses) {
               "case.toml: its points have no value of discretisation.elements, so it cannot become an axis");
     ScanResult b = a;
     b.scan.case_text += "\n";
-    EXPECT_NE(message_of([&] { merged(a, b); }).find("cannot be merged: they are scans of different cases: line "),
-              std::string::npos);
+    EXPECT_CONTAINS(message_of([&] { merged(a, b); }), "cannot be merged: they are scans of different cases: line ");
     b = a, b.scan.axes = {parse_table("energy.k42,energy.H0\n0,1\n", "table.csv")};
     EXPECT_EQ(message_of([&] { merged(a, b); }),
               "case.toml: a table of other keys cannot be merged: energy.k42, energy.H0");
@@ -104,5 +102,4 @@ TEST(Extension, Refuses) {
               "case.toml and case.toml cannot be merged: they differ in --boundary, --seeds or --refine");
 }
 
-}  // namespace extension_test
-}  // namespace tubule
+}  // namespace tubule::extension_test

@@ -11,8 +11,7 @@
 #include "tools/scan/point.hpp"
 #include "tools/scan/uniform_fate.hpp"
 
-namespace tubule {
-namespace outcome_test {
+namespace tubule::outcome_test {
 
 const auto never = [] { return false; };
 
@@ -152,5 +151,4 @@ TEST(UniformFateStudy, IsNeverWrongManyTimes) {
     compare_random_points(2000, 2);
 }
 
-}  // namespace outcome_test
-}  // namespace tubule
+}  // namespace tubule::outcome_test

@@ -8,8 +8,7 @@
 #include <functional>
 #include <random>
 
-namespace tubule {
-namespace plan_test {
+namespace tubule::plan_test {
 
 using Map = std::function<Outcome(std::size_t, std::size_t)>;
 constexpr std::size_t n = 60;
@@ -159,5 +158,4 @@ TEST(Plan, HalvesTheEdgesThatALineCrosses) {
     }
 }
 
-}  // namespace plan_test
-}  // namespace tubule
+}  // namespace tubule::plan_test

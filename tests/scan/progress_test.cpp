@@ -4,8 +4,7 @@
 #include "tests/support/screen.hpp"
 #include "tools/scan/scan_progress.hpp"
 
-namespace tubule {
-namespace progress_test {
+namespace tubule::progress_test {
 
 using test::Screen;
 
@@ -42,5 +41,4 @@ TEST(ScanProgress, BarOnATerminal) {
     EXPECT_EQ(screen.text(), "\r[######..................] 25 of 100 points, left 3 s\x1b[K\r\x1b[K");
 }
 
-}  // namespace progress_test
-}  // namespace tubule
+}  // namespace tubule::progress_test

@@ -11,8 +11,7 @@
 #include "tools/scan/rank_scan.hpp"
 #include "tools/scan/scan_plan.hpp"
 
-namespace tubule {
-namespace starts_test {
+namespace tubule::starts_test {
 
 using test::message_of;
 
@@ -158,11 +157,9 @@ TEST(Starts, OtherRanksGetTheSameScan) {
 TEST(Starts, Refusals) {
     Scan scan = scan_over({families, volumes});
     scan.boundary = BoundaryChoice{.around = {}, .refine = 3};
-    EXPECT_NE(message_of([&] { check_scan(scan); }).find("refine must be absent"), std::string::npos);
+    EXPECT_CONTAINS(message_of([&] { check_scan(scan); }), "refine must be absent");
     const std::string branch = "[equilibrium.branch]\nvary = \"energy.H0\"\nto = 1.0\nstep = 0.5\n";
-    EXPECT_NE(message_of([&] { scan_over({volumes}, text + branch); }).find("a point of a scan is one shape"),
-              std::string::npos);
+    EXPECT_CONTAINS(message_of([&] { scan_over({volumes}, text + branch); }), "a point of a scan is one shape");
 }
 
-}  // namespace starts_test
-}  // namespace tubule
+}  // namespace tubule::starts_test

@@ -2,12 +2,15 @@
 """The rules of CONTRIBUTING that a script can check: includes go downwards, functions fit on a screen, classes have few
 fields, nothing names a place on one machine. Arguments: the folder of the repository."""
 import ast
+import functools
 import re
 import sys
 import unittest
 from pathlib import Path
 
-from cpp_outline import outline
+import cpp_outline
+
+outline = functools.cache(cpp_outline.outline)
 
 root = Path(sys.argv.pop(1))
 

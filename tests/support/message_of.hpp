@@ -1,8 +1,12 @@
-// What a call is refused with.
+// What a call is refused with, and words within a text.
 #pragma once
+
+#include <gtest/gtest.h>
 
 #include <exception>
 #include <string>
+
+#define EXPECT_CONTAINS(text, part) EXPECT_NE(std::string(text).find(part), std::string::npos) << (text)
 
 namespace tubule::test {
 

@@ -12,8 +12,7 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "tests/surface3d/errors.hpp"
 
-namespace tubule::surface3d {
-namespace curvature_test {
+namespace tubule::surface3d::curvature_test {
 
 const Bending all_terms{.k = {1, 1, 1}, .H0 = -0.3};
 
@@ -176,5 +175,4 @@ TEST(Curvature, ATubeHasNoSeam) {
     }
 }
 
-}  // namespace curvature_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::curvature_test

@@ -1,17 +1,17 @@
 // The discrete energy of surfaces in three dimensions: exact derivatives, and convergence to known energies.
+#include "surface3d/equilibrium/discrete_energy.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "common/geometry/profile_point.hpp"
-#include "surface3d/equilibrium/discrete_energy.hpp"
 #include "surface3d/equilibrium/surface_system.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "tests/support/random_vector.hpp"
 
-namespace tubule::surface3d {
-namespace discrete_energy_test {
+namespace tubule::surface3d::discrete_energy_test {
 
 CurvedMesh sphere(int n, int order) {
     return mapped_mesh(icosphere(n), order, [](const Eigen::Vector3d& p) { return Eigen::Vector3d(p.normalized()); });
@@ -142,5 +142,4 @@ TEST(DiscreteEnergy, convergesOnSpheres) {
     }
 }
 
-}  // namespace discrete_energy_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::discrete_energy_test

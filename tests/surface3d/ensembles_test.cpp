@@ -10,8 +10,7 @@
 #include "surface3d/fem/projection.hpp"
 #include "tests/surface3d/motion.hpp"
 
-namespace tubule::surface3d {
-namespace ensembles_test {
+namespace tubule::surface3d::ensembles_test {
 
 const Bending all_terms{.k = {0.5, 0.03, 0.1}, .H0 = -0.6};
 constexpr ModelKind kinds[] = {ModelKind::gradient_flow, ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid};
@@ -47,7 +46,7 @@ TEST(Ensembles, ATubeRestsAtItsTensionAndPressure) {
         SCOPED_TRACE(static_cast<int>(kind));
         Motion motion(tube_mesh({.radius = R, .length = 2, .modes = {}}, 4, 8, 4), open_model(kind, tension, pressure),
                       all_terms);
-        motion.until(0.2, 20);
+        motion.until(0.2, 8);
         const MotionMeasures m = motion.measures();
         EXPECT_NEAR(m.r_min, R, 2e-5);
         EXPECT_NEAR(m.r_max, R, 2e-5);
@@ -56,12 +55,12 @@ TEST(Ensembles, ATubeRestsAtItsTensionAndPressure) {
         Model kept = open_model(kind, {}, pressure);
         kept.area = AreaRule::fixed;
         Motion other(motion.mesh(), kept, all_terms);
-        other.until(0.1, 10);
+        other.until(0.1, 4);
         EXPECT_NEAR(other.measures().tension, tension, 1e-4);
         kept = open_model(kind, tension, {});
         kept.keeps_volume = true;
         Motion third(motion.mesh(), kept, all_terms);
-        third.until(0.1, 10);
+        third.until(0.1, 4);
         EXPECT_NEAR(third.measures().pressure, pressure, 1e-4);
     }
 }
@@ -72,7 +71,7 @@ TEST(Ensembles, ASphereRestsAtItsTensionAndPressure) {
         SCOPED_TRACE(static_cast<int>(kind));
         Motion motion(mesh_of(Sphere{.radius = R, .modes = {}}, icosphere(3), 4), open_model(kind, tension, pressure),
                       all_terms);
-        motion.until(0.2, 10);
+        motion.until(0.2, 5);
         const MotionMeasures m = motion.measures();
         EXPECT_NEAR(m.r_min, R, 2e-5);
         EXPECT_NEAR(m.r_max, R, 2e-5);
@@ -162,9 +161,9 @@ TEST(Ensembles, AReservoirBringsMembraneThatMovesAlong) {
     }
     Motion motion(mesh_of(Sphere{.radius = 1, .modes = {}}, icosphere(2), 4), model, all_terms, {},
                   scheme_named("alpha"));
-    motion.until(end, 80);
-    EXPECT_NEAR(motion.measures().r_max, R, 2e-4 * R);
-    EXPECT_NEAR(motion.measures().speed, V, 2e-3 * V);
+    motion.until(end, 40);
+    EXPECT_NEAR(motion.measures().r_max, R, 8e-4 * R);
+    EXPECT_NEAR(motion.measures().speed, V, 8e-3 * V);
 }
 
 struct Wave {
@@ -174,8 +173,8 @@ struct Wave {
     int n_z, n_theta, steps;
 };
 
-// Log-amplitudes of a single wave on a tube of radius 1, which area, volume and period together would freeze, to a
-// thousandth of its rate, the error of the mesh: theory.md (5.6), (5.9), (5.10), (5.12) at its tension.
+// Log-amplitudes of a single wave on a tube of radius 1, which area, volume and period together would freeze, to
+// 0.4 % of its rate: theory.md (5.6), (5.9), (5.10), (5.12) at its tension.
 void expect_rate(const Wave& wave, const Model& model) {
     const auto& [tension, m, length, n_z, n_theta, steps] = wave;
     const double q = 2 * pi / length;
@@ -187,16 +186,16 @@ void expect_rate(const Wave& wave, const Model& model) {
     motion.until(end, steps);
     const double found = tube_wave(motion.mesh(), 1, m) / start,
                  exact = amplitude_at(end, tube, motion_law(model), q, m);
-    EXPECT_NEAR(std::log(found) / end, std::log(exact) / end, 1e-3 * fastest) << tension << ' ' << m;
+    EXPECT_NEAR(std::log(found) / end, std::log(exact) / end, 4e-3 * fastest) << tension << ' ' << m;
     EXPECT_GT(std::abs(std::log(exact)), 0.05);
 }
 
 TEST(Ensembles, WavesGrowOrDecayAtTheirRates) {
     // At the tension that is given, below and above the thresholds of pearling and buckling.
-    for (const auto& [kind, wave] : {std::pair{ModelKind::gradient_flow, Wave{-1.5, 0, 5, 8, 6, 20}},
-                                     {ModelKind::overdamped, {2, 2, 5, 6, 12, 24}},
-                                     {ModelKind::stokes, {-1.5, 0, 5, 8, 6, 20}},
-                                     {ModelKind::fluid, {4.5, 0, 8, 10, 8, 40}}}) {
+    for (const auto& [kind, wave] : {std::pair{ModelKind::gradient_flow, Wave{-1.5, 0, 5, 8, 6, 10}},
+                                     {ModelKind::overdamped, {2, 2, 5, 6, 12, 12}},
+                                     {ModelKind::stokes, {-1.5, 0, 5, 8, 6, 10}},
+                                     {ModelKind::fluid, {4.5, 0, 8, 10, 8, 20}}}) {
         SCOPED_TRACE(static_cast<int>(kind));
         expect_rate(wave, open_model(kind, wave.tension, pressure_of_tube(all_terms, 1, wave.tension)));
     }
@@ -227,10 +226,7 @@ TEST(FreePeriod, ItsTermsAreDerivatives) {
         EXPECT_NEAR(rate_of_stretch(mesh, [&](const CurvedMesh& m) { return extent(space, m).area; }), rate.area, 1e-8);
         EXPECT_NEAR(rate_of_stretch(mesh, [&](const CurvedMesh& m) { return extent(space, m).volume; }), rate.volume,
                     1e-8);
-        const auto energy = [&](const CurvedMesh& m) {
-            const MotionFields f = motion_fields(space, m, Projection(space, m));
-            return observe(space, m, {f.normal, {}, f.H, f.K}, all_terms).energy;
-        };
+        const auto energy = [&](const CurvedMesh& m) { return observed(m, all_terms).energy; };
         const double exact = rate_of_stretch(mesh, energy) / mesh.period;
         const double found = Motion(mesh, {}, all_terms).measures().force;
         error[i] = std::abs(found / exact - 1);
@@ -252,7 +248,7 @@ TEST(FreePeriod, ATubeRestsAtItsForce) {
             if (!area) model.tension = tension;
             if (!volume) model.pressure = pressure;
             Motion motion(mesh, model, all_terms);
-            motion.until(0.1, 10);
+            motion.until(0.1, 4);
             const MotionMeasures m = motion.measures();
             EXPECT_NEAR(motion.state.period, 2, 2e-4);
             EXPECT_NEAR(m.r_max, R, 1e-4);
@@ -328,14 +324,13 @@ TEST(FreePeriod, AtTheMeasuredForceNothingChanges) {
 
 TEST(FreePeriod, WavesGrowOrDecayAtTheRatesOfItsForce) {
     // Area and volume kept, the tension by theory.md (3.22): with a fixed period this wave would stay as it is.
-    for (const auto& [kind, wave] : {std::pair{ModelKind::overdamped, Wave{-4, 1, 5, 8, 10, 60}},
-                                     {ModelKind::stokes, {2, 2, 5, 6, 12, 24}},
-                                     {ModelKind::fluid, {2, 2, 5, 6, 12, 24}}}) {
+    for (const auto& [kind, wave] : {std::pair{ModelKind::overdamped, Wave{-4, 1, 5, 8, 10, 30}},
+                                     {ModelKind::stokes, {2, 2, 5, 6, 12, 12}},
+                                     {ModelKind::fluid, {2, 2, 5, 6, 12, 12}}}) {
         SCOPED_TRACE(static_cast<int>(kind));
         const double pressure = pressure_of_tube(all_terms, 1, wave.tension);
         expect_rate(wave, stretching_model(kind, force_of_tube(all_terms, 1, wave.tension, pressure), true, true));
     }
 }
 
-}  // namespace ensembles_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::ensembles_test

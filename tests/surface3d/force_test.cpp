@@ -12,8 +12,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "tests/surface3d/smooth_field.hpp"
 
-namespace tubule::surface3d {
-namespace force_test {
+namespace tubule::surface3d::force_test {
 
 double paired(const CurvedMesh& mesh, const Bending& bending) {
     const SurfaceSpace space(mesh);
@@ -91,8 +90,8 @@ TEST(BendingForce, VanishesOnASphereAtItsEquilibriumRadius) {
         for (const auto& [k, order, bound] : {std::tuple{2, 3.0, 1e-2}, {3, 4.0, 5e-5}, {4, 5.0, 1e-5}}) {
             double b[2];
             for (int i : {0, 1})
-                b[i] = std::abs(
-                    paired(curved(Sphere{.radius = radius, .modes = {}}, icosphere(2 * (i + 1)), k), bending));
+                b[i] =
+                    std::abs(paired(curved(Sphere{.radius = radius, .modes = {}}, icosphere(2 * (i + 1)), k), bending));
             EXPECT_GT(std::log2(b[0] / b[1]), order) << k << ", R = " << radius;
             EXPECT_LT(b[1], bound) << k << ", R = " << radius;
         }
@@ -148,5 +147,4 @@ TEST(BendingForce, OfGaussianCurvatureAloneIsZero) {
     EXPECT_LT(bending_force(space, mesh, recover(space, mesh), bending).norm(), 1e-12);
 }
 
-}  // namespace force_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::force_test

@@ -14,11 +14,11 @@
 #include "common/shapes/sphere.hpp"
 #include "common/shapes/torus.hpp"
 #include "surface3d/meshing/graded_mesh.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/surface3d/errors.hpp"
 #include "tests/surface3d/motion.hpp"
 
-namespace tubule::surface3d {
-namespace guards_test {
+namespace tubule::surface3d::guards_test {
 
 // A tube of period 1 whose profile is r = 1 + cos(2 pi s)/2, z = s + bulge sin(2 pi s), displaced by `up`: pancakes,
 // whose faces cross those of the next where bulge is more than 1/(2 pi), as z is then less than before around s = 1/2.
@@ -49,8 +49,7 @@ TEST(SelfIntersection, OfClosedSurfaces) {
         ASSERT_EQ(crossing.has_value(), dent > 1);
         if (dent < 1) continue;
         EXPECT_EQ(crossing->reason, Stop::self_intersection);
-        EXPECT_NE(crossing->message.find("the surface intersects itself near ("), std::string::npos)
-            << crossing->message;
+        EXPECT_CONTAINS(crossing->message, "the surface intersects itself near (");
     }
 }
 
@@ -216,7 +215,7 @@ int steps_taken(double step, double fall, int most) {
     for (int taken = 0; taken < most; ++taken) {
         if (const auto stuck = stall.look(time, step, energy)) {
             EXPECT_EQ(stuck->reason, Stop::solver_failed);
-            EXPECT_NE(stuck->message.find("no progress with steps of"), std::string::npos);
+            EXPECT_CONTAINS(stuck->message, "no progress with steps of");
             return taken;
         }
         time += step, energy -= fall;
@@ -298,5 +297,4 @@ TEST(NewMesh, OnlyNearASphereAreAreaAndVolumeOneCondition) {
     }
 }
 
-}  // namespace guards_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::guards_test

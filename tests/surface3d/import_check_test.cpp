@@ -9,8 +9,7 @@
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
-namespace tubule::surface3d {
-namespace import_check_test {
+namespace tubule::surface3d::import_check_test {
 
 using namespace samples;
 
@@ -330,5 +329,4 @@ TEST(FirstIntersection, ASoupAgreesWithTheIntervalTestOnAllPairs) {
     EXPECT_LT(met, 300) << "too few soups are free to be a test";
 }
 
-}  // namespace import_check_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::import_check_test

@@ -10,8 +10,7 @@
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
-namespace tubule::surface3d {
-namespace import_fit_test {
+namespace tubule::surface3d::import_fit_test {
 
 using namespace samples;
 
@@ -221,5 +220,4 @@ TEST(Fit, RefusesOrdersOutOfRange) {
     EXPECT_THROW(fit_surface(closed(geodesic_sphere(2)), {.order = 5}), std::invalid_argument);
 }
 
-}  // namespace import_fit_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::import_fit_test

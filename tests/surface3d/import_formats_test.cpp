@@ -9,8 +9,7 @@
 #include "tests/surface3d/import_files.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
-namespace tubule::surface3d {
-namespace import_formats_test {
+namespace tubule::surface3d::import_formats_test {
 
 using namespace samples;
 
@@ -379,5 +378,4 @@ TEST(Weld, CollapsedTrianglesAreDroppedWithANote) {
     EXPECT_EQ(mesh.notes[0], "2 triangles collapsed when vertices were welded, and were dropped.");
 }
 
-}  // namespace import_formats_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::import_formats_test

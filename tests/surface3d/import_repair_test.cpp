@@ -7,8 +7,7 @@
 #include "tests/support/message_of.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
-namespace tubule::surface3d {
-namespace import_repair_test {
+namespace tubule::surface3d::import_repair_test {
 
 using namespace samples;
 using testing::Test;
@@ -103,8 +102,8 @@ TEST(RepairMesh, RefusesEdgesOfThreeTriangles) {
     mesh.points.push_back(2 * mesh.points[a]);
     const std::string message = refusal(mesh, true);
     EXPECT_EQ(message.find("mesh: non-manifold edge: the edge from vertex "), 0u) << message;
-    EXPECT_NE(message.find("belongs to 3 triangles, among them triangle 10, "), std::string::npos) << message;
-    EXPECT_NE(message.find(wrapping), std::string::npos) << message;
+    EXPECT_CONTAINS(message, "belongs to 3 triangles, among them triangle 10, ");
+    EXPECT_CONTAINS(message, wrapping);
 }
 
 // A band of 9 quadrilaterals, closed with a half turn.
@@ -130,11 +129,10 @@ TEST(RepairMesh, KeepsHolesOnlyWhereTheyMayBe) {
     mesh.triangles.erase(mesh.triangles.begin() + 5);
     const std::string message = refusal(mesh);
     EXPECT_EQ(message.find("mesh: the mesh is open: the edge from vertex "), 0u) << message;
-    EXPECT_NE(message.find("belongs to no other triangle (3 such edges); if the surface is closed there, shape.weld "
-                           "joins vertices that are near each other; shape.fill_holes = true, with shape.remesh, "
-                           "closes holes"),
-              std::string::npos)
-        << message;
+    EXPECT_CONTAINS(message,
+                    "belongs to no other triangle (3 such edges); if the surface is closed there, shape.weld "
+                    "joins vertices that are near each other; shape.fill_holes = true, with shape.remesh, "
+                    "closes holes");
     EXPECT_EQ(repaired(mesh, true).mesh.triangles.size(), 179u);
 }
 
@@ -172,5 +170,4 @@ TEST(RepairMesh, RefusesTrianglesWithoutArea) {
     EXPECT_EQ(refusal(mesh), "mesh: no triangle has an area");
 }
 
-}  // namespace import_repair_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::import_repair_test

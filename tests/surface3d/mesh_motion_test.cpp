@@ -11,8 +11,7 @@
 #include "surface3d/meshing/graded_mesh.hpp"
 #include "surface3d/meshing/remesh.hpp"
 
-namespace tubule::surface3d {
-namespace mesh_motion_test {
+namespace tubule::surface3d::mesh_motion_test {
 
 const Sphere waved{.radius = 1.0, .modes = {{.amplitude = 0.2, .l = 2, .m = 1}, {.amplitude = 0.1, .l = 3, .m = 2}}};
 
@@ -163,7 +162,7 @@ TEST(MeshMotion, FollowsTheCurvatureOfANeck) {
         Motion motion = deep_neck(tube, graded, follow);
         double tau = 1e-6;
         for (double rest = 0.012; rest > 1e-12; rest -= tau) {
-            tau = std::min({1.5 * tau, 5e-4, rest});
+            tau = std::min({1.5 * tau, 1e-3, rest});
             motion.steps(tau, 1);
         }
         const MotionMeasures m = motion.measures();
@@ -177,5 +176,4 @@ TEST(MeshMotion, FollowsTheCurvatureOfANeck) {
     EXPECT_LT(left.error, 0.5 * even.error);  // grading is not undone either
 }
 
-}  // namespace mesh_motion_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::mesh_motion_test

@@ -9,8 +9,7 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
-namespace tubule::surface3d {
-namespace mesh_smoothing_test {
+namespace tubule::surface3d::mesh_smoothing_test {
 
 using namespace samples;
 
@@ -151,5 +150,4 @@ TEST(MeshDistances, OfConcentricSpheres) {
     EXPECT_NEAR(most, 1.1 - lowest, 2e-3);
 }
 
-}  // namespace mesh_smoothing_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::mesh_smoothing_test

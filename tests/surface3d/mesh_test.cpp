@@ -16,8 +16,7 @@
 #include "surface3d/meshing/graded_mesh.hpp"
 #include "tests/surface3d/errors.hpp"
 
-namespace tubule::surface3d {
-namespace mesh_test {
+namespace tubule::surface3d::mesh_test {
 
 // Every edge is shared by two triangles that run through it in opposite directions.
 void expect_closed(const CurvedMesh& mesh) {
@@ -233,5 +232,4 @@ TEST(GradedMesh, BeatsAUniformOneOfAsManyNodesAtANeck) {
     expect_gains(neck, meridian(base(neck)), {1200, 2400}, H2, K2, {0, 10, 20, 2, 20});
 }
 
-}  // namespace mesh_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::mesh_test

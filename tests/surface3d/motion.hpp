@@ -65,16 +65,31 @@ inline StepSystem system_at_rest(const CurvedMesh& mesh, const Bending& bending,
     return system;
 }
 
+// The fields that a motion has on a mesh, and what is observed with them.
+inline MotionFields fields_of(const CurvedMesh& mesh, double kg = 0) {
+    const SurfaceSpace space(mesh);
+    return motion_fields(space, mesh, Projection(space, mesh), kg);
+}
+inline Observables observed(const CurvedMesh& mesh, const Bending& bending) {
+    const MotionFields f = fields_of(mesh, bending.kg);
+    return observe(SurfaceSpace(mesh), mesh, {f.normal, {}, f.H, f.K}, bending);
+}
+
 // d/ds of quantity(moved(s)) at s = 0, moved(s) being a mesh; fourth order in the step.
 template <class Moved, class Quantity>
-double rate_along(const Moved& moved, const Quantity& quantity) {
+auto rate_along(const Moved& moved, const Quantity& quantity) {
     constexpr double step = 1e-3;
     const auto at = [&](double s) { return quantity(moved(s)); };
-    return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step);
+    using Value = decltype(at(step));
+    return Value((8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step));
 }
 inline CurvedMesh moved_mesh(CurvedMesh mesh, const VectorField& v, double s) {
     for (int i = 0; i < mesh.size(); ++i) mesh.nodes[i] += s * v.col(i);
     return mesh;
+}
+template <class Quantity>  // of mesh + s v
+auto rate_of(const CurvedMesh& mesh, const VectorField& v, const Quantity& quantity) {
+    return rate_along([&](double s) { return moved_mesh(mesh, v, s); }, quantity);
 }
 inline CurvedMesh stretched_mesh(CurvedMesh mesh, double by) {
     for (Eigen::Vector3d& x : mesh.nodes) x.z() *= 1 + by;

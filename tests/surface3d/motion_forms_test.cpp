@@ -19,8 +19,7 @@
 #include "tests/surface3d/motion.hpp"
 #include "tests/surface3d/smooth_field.hpp"
 
-namespace tubule::surface3d {
-namespace motion_forms_test {
+namespace tubule::surface3d::motion_forms_test {
 
 const Sphere wavy{.radius = 1, .modes = {{0.15, 2, 1}, {0.1, 3, 2}}};
 const SurfaceLaw gradient_flow = motion_law({});
@@ -29,25 +28,6 @@ const SurfaceLaw fluid = motion_law({.kind = ModelKind::fluid, .Re = 2, .gamma =
 // Component by component, as a velocity in MotionUnknowns.
 Eigen::VectorXd stacked(const VectorField& v) {
     return Eigen::MatrixXd(v.transpose()).reshaped();
-}
-
-MotionFields fields_of(const CurvedMesh& mesh) {
-    const SurfaceSpace space(mesh);
-    return motion_fields(space, mesh, Projection(space, mesh));
-}
-
-CurvedMesh moved(CurvedMesh mesh, const VectorField& by) {
-    for (int i = 0; i < mesh.size(); ++i) mesh.nodes[i] += by.col(i);
-    return mesh;
-}
-
-// d/ds of quantity(mesh + s v) at s = 0, fourth order in the step.
-template <class Quantity>
-auto rate_of(const CurvedMesh& mesh, const VectorField& v, const Quantity& quantity) {
-    const double s = 1e-3;
-    const auto at = [&](double x) { return quantity(moved(mesh, x * v)); };
-    using Value = decltype(at(0.0));
-    return Value((8 * (at(s) - at(-s)) - (at(2 * s) - at(-2 * s))) / (12 * s));
 }
 
 // The system of a step te on a surface at rest.
@@ -104,10 +84,7 @@ TEST(MotionForce, ApproachesTheRateOfTheDiscreteEnergy) {
     for (const Bending& bending : energies) {
         const Fall fall = fall_of(4, [&](const CurvedMesh& mesh) {
             const VectorField v = smooth_at(mesh);
-            const double rate = rate_of(mesh, v, [&](const CurvedMesh& m) {
-                const MotionFields f = fields_of(m);
-                return observe(SurfaceSpace(m), m, {f.normal, {}, f.H, f.K}, bending).energy;
-            });
+            const double rate = rate_of(mesh, v, [&](const CurvedMesh& m) { return observed(m, bending).energy; });
             AtRest rest(mesh, fluid, bending, 1);
             const double force = rest.assembled().force.head(3 * mesh.size()).dot(stacked(v));
             // What moves along the normal alone has the normal components of the same force.
@@ -125,10 +102,8 @@ TEST(MotionForce, OtherOrders) {
     for (const auto& [order, least, most] : {std::tuple{2, 1.5, 0.05}, {3, 2.0, 5e-3}}) {
         const Fall fall = fall_of(order, [&](const CurvedMesh& mesh) {
             const VectorField v = smooth_at(mesh);
-            const double rate = rate_of(mesh, v, [&](const CurvedMesh& m) {
-                const MotionFields f = fields_of(m);
-                return observe(SurfaceSpace(m), m, {f.normal, {}, f.H, f.K}, energies.back()).energy;
-            });
+            const double rate =
+                rate_of(mesh, v, [&](const CurvedMesh& m) { return observed(m, energies.back()).energy; });
             AtRest rest(mesh, fluid, energies.back(), 1);
             return std::abs(rest.assembled().force.head(3 * mesh.size()).dot(stacked(v)) + rate) / std::abs(rate);
         });
@@ -489,5 +464,4 @@ TEST(StepUnknowns, AreThoseOfTheModel) {
     EXPECT_EQ(MotionUnknowns(mesh, fluid, {.k = {1, 0, 1}}).size(), 5 * n + 42);  // 10 (k-1)^2 + 2
 }
 
-}  // namespace motion_forms_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::motion_forms_test

@@ -9,8 +9,7 @@
 #include "surface3d/motion/schemes/paper.hpp"
 #include "tests/surface3d/motion_runs.hpp"
 
-namespace tubule::surface3d {
-namespace paper_scheme_test {
+namespace tubule::surface3d::paper_scheme_test {
 
 MotionLaw law_of(ModelKind kind, double Re = 1, std::optional<double> gamma = {}) {
     return motion_law({.kind = kind, .Re = Re, .gamma = gamma, .keeps_volume = {}});
@@ -143,5 +142,4 @@ TEST(PaperScheme, RefusesWhatThePaperHasNot) {
     EXPECT_THROW(Paper(mesh, law_of(ModelKind::fluid), bending, {.smoothing = -1}), std::invalid_argument);
 }
 
-}  // namespace paper_scheme_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::paper_scheme_test

@@ -5,8 +5,7 @@
 
 #include <cmath>
 
-namespace tubule::surface3d {
-namespace reference_triangle_test {
+namespace tubule::surface3d::reference_triangle_test {
 
 double integral(int degree, int i, int j) {
     double sum = 0;
@@ -92,5 +91,4 @@ TEST(Tabulation, DifferentiatesPolynomialsExactly) {
     }
 }
 
-}  // namespace reference_triangle_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::reference_triangle_test

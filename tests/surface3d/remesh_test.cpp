@@ -17,10 +17,10 @@
 #include "surface3d/mesh/closest_point.hpp"
 #include "surface3d/mesh/half_edges.hpp"
 #include "surface3d/motion/motion_fields.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/surface3d/errors.hpp"
 
-namespace tubule::surface3d {
-namespace remesh_test {
+namespace tubule::surface3d::remesh_test {
 
 using Eigen::Vector3d;
 
@@ -366,16 +366,15 @@ TEST(Remesh, SaysWhereItCannot) {
     folded.nodes[folded.node(7, 3)] = folded.nodes[folded.node(7, 0)];
     const StopReport fold = refusal(folded);
     EXPECT_EQ(fold.reason, Stop::mesh_lost);
-    EXPECT_NE(fold.message.find("triangle 7 folds at ("), std::string::npos) << fold.message;
+    EXPECT_CONTAINS(fold.message, "triangle 7 folds at (");
 
     const StopReport coarse = refusal(mapped_mesh(icosphere(3), 3, map_of(perturbed_sphere())));
     EXPECT_EQ(coarse.reason, Stop::resolution_lost);
-    EXPECT_NE(coarse.message.find("needs"), std::string::npos) << coarse.message;
+    EXPECT_CONTAINS(coarse.message, "needs");
 
     const StopReport best = refusal(sheared_ellipsoid(5, 3, 0), {.quality = 0.99});
     EXPECT_EQ(best.reason, Stop::mesh_lost);
-    EXPECT_NE(best.message.find("instead of the required 0.99 in the triangle at ("), std::string::npos)
-        << best.message;
+    EXPECT_CONTAINS(best.message, "instead of the required 0.99 in the triangle at (");
 
     // So thin and turned that the nodes no longer tell the surface.
     const StopReport twisted = refusal(sheared_ellipsoid(5, 3, 6));
@@ -385,7 +384,7 @@ TEST(Remesh, SaysWhereItCannot) {
     const StopReport flat =
         refusal(mapped_mesh(tube_rings(0.5, 1, 2, 8), 2, map_of(Tube{.radius = 0.5, .length = 1, .modes = {}})));
     EXPECT_EQ(flat.reason, Stop::mesh_lost);
-    EXPECT_NE(flat.message.find("fewer than three rings"), std::string::npos) << flat.message;
+    EXPECT_CONTAINS(flat.message, "fewer than three rings");
 
     const CurvedMesh mesh = sheared_ellipsoid(2, 2, 0);
     EXPECT_THROW(remesh(mesh, Eigen::MatrixXd::Zero(1, 3), {}), std::invalid_argument);
@@ -394,5 +393,4 @@ TEST(Remesh, SaysWhereItCannot) {
     EXPECT_THROW(remesh(mesh, {}, {.quality = 1}), std::invalid_argument);
 }
 
-}  // namespace remesh_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::remesh_test

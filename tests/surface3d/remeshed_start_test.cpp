@@ -14,8 +14,7 @@
 #include "tests/support/message_of.hpp"
 #include "tests/surface3d/import_samples.hpp"
 
-namespace tubule::surface3d {
-namespace remeshed_start_test {
+namespace tubule::surface3d::remeshed_start_test {
 
 using namespace samples;
 
@@ -256,5 +255,4 @@ TEST(NewTriangles, OfEqualEdges) {
     for (const Vector3d& x : mesh.points) EXPECT_NEAR(x.norm(), 1, 0.01);  // on the triangles of the file
 }
 
-}  // namespace remeshed_start_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::remeshed_start_test

@@ -1,9 +1,12 @@
 // Whole runs of cases that are given as text, and what they report.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -62,6 +65,31 @@ inline Outcome run_case(const std::string& text, const std::vector<std::string>&
     Outcome out = begin(text, sets);
     out.summary = run(out.c, out.watch);
     return out;
+}
+
+// The undisturbed run again, interrupted after so many rows and resumed: series end as its own. The interrupted run.
+inline Outcome expect_the_same_resumed(const Outcome& whole, const std::string& text,
+                                       const std::vector<std::string>& sets, const std::vector<std::string>& names,
+                                       std::size_t rows) {
+    Outcome first = begin(text, sets), second = begin(text, sets);
+    first.watch.most_rows = rows;
+    first.summary = run(first.c, first.watch);
+    EXPECT_EQ(first.summary.stop.reason, Stop::interrupted);
+    if (!first.watch.saved) throw std::runtime_error("no state was saved");
+    const Restart restart{*first.watch.saved, first.watch.meshes.at(*first.watch.saved->mesh)};
+    second.summary = run(second.c, second.watch, &restart);
+    EXPECT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
+    for (const std::string& name : names)
+        EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;
+    // Nothing of the past is forgotten: steps continue as if there had been no end.
+    EXPECT_EQ(first.watch.rows.size() + second.watch.rows.size(), whole.watch.rows.size());
+    EXPECT_NEAR(second.summary.estimated_error, whole.summary.estimated_error, 1e-6 * whole.summary.estimated_error);
+    return first;
+}
+inline void expect_the_same_resumed(const std::string& text, const std::vector<std::string>& sets,
+                                    const std::vector<std::string>& names) {
+    const Outcome whole = run_case(text, sets);
+    expect_the_same_resumed(whole, text, sets, names, whole.watch.rows.size() / 2);
 }
 
 }  // namespace tubule::surface3d

@@ -9,8 +9,7 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 
-namespace tubule::surface3d {
-namespace surface_branch_test {
+namespace tubule::surface3d::surface_branch_test {
 
 void set_reduced_volume(StationaryProblem& p, double v) {
     p.constraints = {4 * pi, v * 4 * pi / 3, {}};
@@ -60,7 +59,7 @@ TEST(SurfaceBranchStudy, prolates) {
 // below that, with one negative direction: they separate oblates from prolates.
 TEST(SurfaceBranch, triaxialFromOblates) {
     const double v = 0.745;
-    SurfaceEquilibriumSettings shapes{.accuracy = 2e-3, .triangles = 320, .descend = false};
+    SurfaceEquilibriumSettings shapes{.accuracy = 2e-3, .triangles = 180, .descend = false};
     const SurfaceEquilibrium start = at_rest(v, 1.24, 0.55, shapes);
     ASSERT_EQ(start.stop, Stop::finished) << start.message;
     EXPECT_EQ(start.spectrum.negative, 0);
@@ -79,5 +78,4 @@ TEST(SurfaceBranch, triaxialFromOblates) {
     EXPECT_LT(begins[1], begins[0]);
 }
 
-}  // namespace surface_branch_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::surface_branch_test

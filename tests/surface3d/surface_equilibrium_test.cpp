@@ -18,8 +18,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule::surface3d {
-namespace surface_equilibrium_test {
+namespace tubule::surface3d::surface_equilibrium_test {
 
 CurvedMesh spheroid(int triangles, double a, double c) {
     const int n = std::max(1, static_cast<int>(std::lround(std::sqrt(triangles / 20.0))));
@@ -38,10 +37,10 @@ StationaryProblem vesicle(double reduced_volume) {
 TEST(SurfaceEquilibrium, prolateOfTheAxisymmetricTier) {
     const auto make = [](int triangles) { return spheroid(triangles, 0.9, 1.5); };
     const SurfaceEquilibrium e =
-        find_equilibrium(vesicle(0.8), make, {.accuracy = 1e-4, .first_triangles = 80, .modes = 6});
+        find_equilibrium(vesicle(0.8), make, {.accuracy = 1e-3, .first_triangles = 80, .modes = 6});
     ASSERT_EQ(e.stop, Stop::finished) << e.message;
     EXPECT_NEAR(e.values.energy, 34.870181359, 2 * e.estimated_error * e.reference_energy);  // not a bound
-    EXPECT_LT(e.estimated_error, 1e-4);
+    EXPECT_LT(e.estimated_error, 1e-3);
     EXPECT_NEAR(e.sigma, -5.11116342, 5e-3);
     EXPECT_EQ(e.held_motions, 5);
     EXPECT_EQ(e.spectrum.negative, 0);
@@ -80,47 +79,35 @@ TEST(SurfaceSpectrum, constraintsAndLowRank) {
     EXPECT_EQ(count_below(A, nested_dissection(A.form), 10.2), (dense.array() < 10.2).count());
 }
 
-// Eigenvalues of the second variation of a sphere under a pressure: the stiffness G_l, 2 l + 1 times each.
+// Eigenvalues of the second variation of a sphere under a pressure: the stiffness G_l, 2 l + 1 times each. A pressure
+// of the volume with the same value acts on l = 0 alone, by -dP/dV 4 pi R^2: theory.md (3.24).
 TEST(SurfaceSpectrum, sphere) {
     const Bending bending{.k = {0.5, 0.02, 0.06}, .H0 = -0.3};
     const theory::UniformSphere sphere{bending};
-    StationaryProblem problem{bending, {}};
-    problem.loads.pressure = theory::pressure_at_rest(sphere);
-    SurfaceSystem system(spheroid(320, 1, 1), problem);
-    Eigen::VectorXd u = system.unknowns_at_base();
-    int iterations = 0;
-    ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
-    const SurfaceSpectrum s = system.spectrum(u, 13);
-    std::vector<double> expected{theory::stiffness(sphere, 0)};
-    for (int i = 0; i < 5; ++i) expected.push_back(theory::stiffness(sphere, 2));
-    for (int i = 0; i < 7; ++i) expected.push_back(theory::stiffness(sphere, 3));
-    std::sort(expected.begin(), expected.end());
-    EXPECT_EQ(s.doubt, "");
-    EXPECT_EQ(system.held_motions(), 3);  // turns leave a sphere as it is
-    for (int i = 0; i < 13; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
-}
-
-// A pressure of the volume with the same value acts on l = 0 alone, by -dP/dV 4 pi R^2: theory.md (3.24).
-TEST(SurfaceSpectrum, sphereUnderAPressureOfTheVolume) {
-    const Bending bending{.k = {0.5, 0.02, 0.06}, .H0 = -0.3};
-    const theory::UniformSphere sphere{bending};
-    const double P = theory::pressure_at_rest(sphere), V = 4 * pi / 3, N = 60;
-    const std::string text = fmt::format("{:.17g} + 60*(1/V - 1/{:.17g})", P, V);
-    const std::string_view variables[]{"V"};
-    StationaryProblem problem{bending, {}};
-    problem.loads.of_volume = std::make_shared<const Formula>(parse_formula(text, variables));
-    SurfaceSystem system(spheroid(320, 1, 1), problem);
-    Eigen::VectorXd u = system.unknowns_at_base();
-    int iterations = 0;
-    ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
-    EXPECT_NEAR(system.values(u).volume, V, 1e-5);
-    const SurfaceSpectrum s = system.spectrum(u, 13);
-    std::vector<double> expected{theory::stiffness(sphere, 0) + N / (V * V) * 4 * pi};
-    for (int i = 0; i < 5; ++i) expected.push_back(theory::stiffness(sphere, 2));
-    for (int i = 0; i < 7; ++i) expected.push_back(theory::stiffness(sphere, 3));
-    std::sort(expected.begin(), expected.end());
-    EXPECT_EQ(s.doubt, "");
-    for (int i = 0; i < 13; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
+    const double P = theory::pressure_at_rest(sphere), V = 4 * pi / 3;
+    for (const double N : {0.0, 60.0}) {
+        SCOPED_TRACE(N);
+        const std::string text = fmt::format("{:.17g} + {}*(1/V - 1/{:.17g})", P, N, V);
+        const std::string_view variables[]{"V"};
+        StationaryProblem problem{bending, {}};
+        if (N == 0)
+            problem.loads.pressure = P;
+        else
+            problem.loads.of_volume = std::make_shared<const Formula>(parse_formula(text, variables));
+        SurfaceSystem system(spheroid(320, 1, 1), problem);
+        Eigen::VectorXd u = system.unknowns_at_base();
+        int iterations = 0;
+        ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
+        EXPECT_NEAR(system.values(u).volume, V, 1e-5);
+        const SurfaceSpectrum s = system.spectrum(u, 13);
+        std::vector<double> expected{theory::stiffness(sphere, 0) + N / (V * V) * 4 * pi};
+        for (int i = 0; i < 5; ++i) expected.push_back(theory::stiffness(sphere, 2));
+        for (int i = 0; i < 7; ++i) expected.push_back(theory::stiffness(sphere, 3));
+        std::sort(expected.begin(), expected.end());
+        EXPECT_EQ(s.doubt, "");
+        EXPECT_EQ(system.held_motions(), 3);  // turns leave a sphere as it is
+        for (int i = 0; i < 13; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
+    }
 }
 
 // Spheres about a particle and waves on them, theory.md (2.22), as in tests/axisym/potential_test.cpp: three turns
@@ -212,7 +199,7 @@ TEST(SurfaceEquilibrium, beadsNeedFineMeshes) {
     const auto make = [](int triangles) { return spheroid(triangles, 0.99, 1.02); };
     const SurfaceEquilibrium e = find_equilibrium(problem, make, {.triangles = 80});
     EXPECT_EQ(e.stop, Stop::resolution_lost);
-    EXPECT_NE(e.message.find("times model.bead_width apart"), std::string::npos) << e.message;
+    EXPECT_CONTAINS(e.message, "times model.bead_width apart");
 }
 
 // Waves of a straight tube under tension and pressure, two each (four with m > 0): theory.md (5.8).
@@ -255,9 +242,9 @@ TEST(SurfaceEquilibrium, cliffordTorus) {
                            [&](const Eigen::Vector3d& p) { return Eigen::Vector3d(position(torus, p)); });
     };
     const SurfaceEquilibrium e =
-        find_equilibrium(willmore, make, {.accuracy = 1e-4, .first_triangles = 300, .near = true, .modes = 3});
+        find_equilibrium(willmore, make, {.accuracy = 1e-3, .first_triangles = 300, .near = true, .modes = 3});
     ASSERT_EQ(e.stop, Stop::finished) << e.message;
-    EXPECT_NEAR(e.values.energy, 2 * pi * pi, 1e-4 * 2 * pi * pi);
+    EXPECT_NEAR(e.values.energy, 2 * pi * pi, 1e-3 * 2 * pi * pi);
     EXPECT_EQ(e.held_motions, 8);
     EXPECT_EQ(e.spectrum.negative, 0);
     EXPECT_GT(e.spectrum.values[0], 0.1);
@@ -290,5 +277,4 @@ TEST(SurfaceSpectrum, zeroModesOfTheCliffordTorus) {
     EXPECT_NEAR(free[1][8], 0.298, 0.003);
 }
 
-}  // namespace surface_equilibrium_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::surface_equilibrium_test

@@ -13,8 +13,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/mesh_record.hpp"
 
-namespace tubule::surface3d {
-namespace surface_modes_test {
+namespace tubule::surface3d::surface_modes_test {
 
 template <class Shape>
 CurvedMesh surface(const TriangleMesh& base, const Shape& shape, int order = 3) {
@@ -82,5 +81,4 @@ TEST(SurfaceModes, ofAFrame) {
     EXPECT_EQ(tube_mode_amplitude(frame_surface(frame, cells), 1, 0), tube_mode_amplitude(mesh, 1, 0));
 }
 
-}  // namespace surface_modes_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::surface_modes_test

@@ -14,8 +14,7 @@
 #include "surface3d/motion/motion_fields.hpp"
 #include "tests/surface3d/errors.hpp"
 
-namespace tubule::surface3d {
-namespace transfer_test {
+namespace tubule::surface3d::transfer_test {
 
 using Eigen::Vector3d;
 
@@ -109,5 +108,4 @@ TEST(Transfer, NeedsMeshesOfOneSurface) {
     EXPECT_THROW(places_of_nodes(mesh, reversed), SolveError);
 }
 
-}  // namespace transfer_test
-}  // namespace tubule::surface3d
+}  // namespace tubule::surface3d::transfer_test

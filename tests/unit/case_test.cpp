@@ -18,8 +18,7 @@
 #include "tests/support/message_of.hpp"
 #include "tests/support/paths.hpp"
 
-namespace tubule {
-namespace case_test {
+namespace tubule::case_test {
 
 const std::string good =
     "tier = \"axisym\"\n"                   // 1
@@ -161,12 +160,7 @@ TEST(CaseRefusal, OtherCases) {
 
 TEST(CaseRefusal, Files) {
     const auto message = [](const std::filesystem::path& path) -> std::string {
-        try {
-            read_case(path);
-        } catch (const CaseError& error) {
-            return error.what();
-        }
-        return "accepted";
+        return test::message_of<CaseError>([&] { read_case(path); });
     };
     const std::filesystem::path folder = testing::TempDir();
     EXPECT_EQ(message(folder), folder.string() + ": is a directory: give a file in it");
@@ -185,12 +179,7 @@ TEST(CaseRefusal, Files) {
 // toml++ overflows the stack with a key of some ten thousand parts.
 TEST(CaseRefusal, KeysOfManyParts) {
     const auto message = [](const std::string& text, const std::vector<std::string>& sets = {}) -> std::string {
-        try {
-            parse_case(text, sets, "x.toml");
-        } catch (const CaseError& error) {
-            return error.what();
-        }
-        return "accepted";
+        return test::message_of<CaseError>([&] { parse_case(text, sets, "x.toml"); });
     };
     const auto key = [](int parts, const std::string& part) {
         std::string text = part;
@@ -387,7 +376,7 @@ TEST(CheckCommand, PrintsTheEffectiveCaseAndLooksAtAllCases) {
     const auto [both, failed] = run_program("check " + bad_path + " " + good_path);
     EXPECT_EQ(failed, 2);
     EXPECT_EQ(both.find(bad_path + ":11:1: unknown key shape.raduis"), 0u) << both;
-    EXPECT_NE(both.find("# OK " + good_path), std::string::npos) << both;
+    EXPECT_CONTAINS(both, "# OK " + good_path);
     std::filesystem::remove(good_path);
     std::filesystem::remove(bad_path);
 }
@@ -593,5 +582,4 @@ TEST(Tube, VolumeIsExact) {
     EXPECT_NEAR(volume(tube), std::numbers::pi * tube.length * sum / n, 1e-13);
 }
 
-}  // namespace case_test
-}  // namespace tubule
+}  // namespace tubule::case_test

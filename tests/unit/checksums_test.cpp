@@ -67,15 +67,13 @@ TEST_F(Checksums, NothingReadsOrReplacesADamagedResult) {
          {message_of([&] { read_result(file); }), message_of([&] { ResultWriter::resume(file); }), message_of([&] {
               ResultWriter::create(file, {"", {}}, {}, series);
           })})
-        EXPECT_NE(message.find(file.string() + ": it is damaged: its checksum is wrong; bring back a copy"),
-                  std::string::npos)
-            << message;
+        EXPECT_CONTAINS(message, file.string() + ": it is damaged: its checksum is wrong; bring back a copy");
 }
 
 TEST_F(Checksums, CutOffAndLengthenedFilesAreDamaged) {
     const std::size_t hdf5 = sound.size() - trailer;
     put(sound.substr(0, hdf5 - 1));
-    EXPECT_NE(examine(file).damage.find("cut off"), std::string::npos);
+    EXPECT_CONTAINS(examine(file).damage, "cut off");
     for (const std::size_t size : {hdf5 + 1, hdf5 + 40, sound.size() - 1}) {
         put(sound.substr(0, size));
         EXPECT_EQ(examine(file).damage, "its checksums are damaged") << size;

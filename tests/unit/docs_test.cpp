@@ -18,8 +18,7 @@
 #include "common/series/catalogue.hpp"
 #include "tests/support/paths.hpp"
 
-namespace tubule {
-namespace docs_test {
+namespace tubule::docs_test {
 
 std::string page(const std::string& name) {
     std::ifstream file(test::sources + "/" + name);
@@ -279,5 +278,4 @@ TEST(Docs, TellTheKeysOfEveryShape) {
     expect_keys_of_shapes(Shape{});
 }
 
-}  // namespace docs_test
-}  // namespace tubule
+}  // namespace tubule::docs_test

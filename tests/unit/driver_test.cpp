@@ -9,8 +9,7 @@
 #include "common/run/run_output.hpp"
 #include "tests/missing_fields.hpp"
 
-namespace tubule {
-namespace driver_test {
+namespace tubule::driver_test {
 
 struct Watch : RunObserver {
     int discards = 0;
@@ -135,5 +134,4 @@ TEST(Record, HoldsAnotherOne) {
     EXPECT_THROW(nested(inner, "coarser_", RecordKind::curve), std::runtime_error);
 }
 
-}  // namespace driver_test
-}  // namespace tubule
+}  // namespace tubule::driver_test

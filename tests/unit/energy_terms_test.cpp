@@ -9,8 +9,7 @@
 #include "common/theory/dispersion.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace energy_terms_test {
+namespace tubule::energy_terms_test {
 
 using test::message_of;
 
@@ -81,10 +80,9 @@ TEST(EnergyTerms, ThinTubesAndSmallSpheresHaveNoGradients) {
     const auto words = [](double k20, double k40, double k42) {
         return unbounded_below(Bending{.k = {k20, k40, k42}, .H0 = -1, .kg = 0.3});
     };
-    EXPECT_NE(words(-1, 0, 0).find("ever smaller spheres"), std::string::npos);  // f = -H^2 is 4 times that of tubes
-    EXPECT_NE(words(1, 0, -2).find("ever smaller spheres"), std::string::npos);
-    EXPECT_NE(unbounded_below(Bending{.k = {-1, 0, 1}, .H0 = 0, .kg = 0.3}).find("thinner straight tubes"),
-              std::string::npos);
+    EXPECT_CONTAINS(words(-1, 0, 0), "ever smaller spheres");  // f = -H^2 is 4 times that of tubes
+    EXPECT_CONTAINS(words(1, 0, -2), "ever smaller spheres");
+    EXPECT_CONTAINS(unbounded_below(Bending{.k = {-1, 0, 1}, .H0 = 0, .kg = 0.3}), "thinner straight tubes");
     EXPECT_EQ(words(-1, 1, 0), "");
     EXPECT_EQ(words(0, 1, -3), "");  // saddles have no bound of f, but they have gradients
     EXPECT_NE(unbounded_below(Bending{.k = {0, 1, -3}, .H0 = -1}), "");
@@ -157,9 +155,7 @@ TEST(EnergyTerms, BadOnesAreRefusedWithTheirPlace) {
     const auto message = [](const std::string& terms, const std::vector<std::string>& sets = {}) {
         return message_of<CaseError>([&] { with_terms(terms, sets); });
     };
-    const auto has = [](const std::string& text, const std::string& part) {
-        EXPECT_NE(text.find(part), std::string::npos) << text;
-    };
+    const auto has = [](const std::string& text, const std::string& part) { EXPECT_CONTAINS(text, part); };
     const std::string term = "[[energy.term]]\n";
     has(message(term + "H = 3\n"), "missing key energy.term.0.modulus");
     has(message(term + "modulus = 1\nH = -1\n"), "case.toml:7:5: energy.term.0.H must be an integer >= 0 and <= 20");
@@ -179,5 +175,4 @@ TEST(EnergyTerms, BadOnesAreRefusedWithTheirPlace) {
               "energy_31");
 }
 
-}  // namespace energy_terms_test
-}  // namespace tubule
+}  // namespace tubule::energy_terms_test

@@ -9,8 +9,7 @@
 
 #include "common/geometry/jet.hpp"
 
-namespace tubule {
-namespace formula_test {
+namespace tubule::formula_test {
 
 constexpr std::array<std::string_view, 2> names{"x", "y"};
 
@@ -139,5 +138,4 @@ TEST(Formula, SizesAddUp) {
     EXPECT_DOUBLE_EQ(f.size, 31);
 }
 
-}  // namespace formula_test
-}  // namespace tubule
+}  // namespace tubule::formula_test

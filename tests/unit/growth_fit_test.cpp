@@ -8,8 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace tubule::theory {
-namespace growth_fit_test {
+namespace tubule::theory::growth_fit_test {
 
 struct Samples {
     std::vector<double> t, a;
@@ -76,5 +75,4 @@ TEST(GrowthFit, tooFewPointsAreRefused) {
     EXPECT_NO_THROW(fit_growth({0, 1, 2, 3, 4, 5}, {1, 1, 1, 1, 1, 1}));
 }
 
-}  // namespace growth_fit_test
-}  // namespace tubule::theory
+}  // namespace tubule::theory::growth_fit_test

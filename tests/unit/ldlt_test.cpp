@@ -14,8 +14,7 @@
 #include "tests/sphere_matrices.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace ldlt_test {
+namespace tubule::ldlt_test {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Dense = Eigen::MatrixXd;
@@ -316,11 +315,11 @@ TEST(Gmres, failsLoudly) {
     const auto diagonal = [](const Vector& u, Vector& v) {
         v = u.cwiseProduct(Vector::LinSpaced(20, 1, 20)) + 0.1 * u.reverse();
     };
-    EXPECT_NE(solve(diagonal, 1).find("GMRES of size 20 ended at a residual of "), std::string::npos);
+    EXPECT_CONTAINS(solve(diagonal, 1), "GMRES of size 20 ended at a residual of ");
     // Rounding is the end of all.
     const Vector full = Vector::LinSpaced(20, 1, 2).cwiseSqrt();  // as a unit vector might be met exactly
     const std::string rounding = message_of([&] { gmres.solve(diagonal, copy, full, x, 1e-20, 100); });
-    EXPECT_NE(rounding.find("the tolerance is 1.0e-20"), std::string::npos) << rounding;
+    EXPECT_CONTAINS(rounding, "the tolerance is 1.0e-20");
     const auto broken = [](const Vector& u, Vector& v) { v = u * std::nan(""); };
     EXPECT_EQ(message_of([&] { gmres.solve(diagonal, broken, Vector::Ones(20), x, 1e-10, 10); }),
               "GMRES: vector 1 of size 20 is not finite");
@@ -354,5 +353,4 @@ TEST(BorderedLdlt, solvesWithAndWithoutPivots) {
     }
 }
 
-}  // namespace ldlt_test
-}  // namespace tubule
+}  // namespace tubule::ldlt_test

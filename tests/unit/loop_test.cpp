@@ -8,8 +8,7 @@
 #include "common/run/stall.hpp"
 #include "common/solve/stop.hpp"
 
-namespace tubule {
-namespace loop_test {
+namespace tubule::loop_test {
 
 constexpr double step_length = 0.25;
 
@@ -209,5 +208,4 @@ TEST(Loop, ResumesAtItsEnd) {
     EXPECT_TRUE(run.watch.rows.empty());
 }
 
-}  // namespace loop_test
-}  // namespace tubule
+}  // namespace tubule::loop_test

@@ -5,8 +5,7 @@
 
 #include "common/case/read.hpp"
 
-namespace tubule {
-namespace model_test {
+namespace tubule::model_test {
 
 // What docs/case_files.md says about each model. Without `default`: a model that is missing here does not compile.
 #pragma GCC diagnostic error "-Wswitch"
@@ -164,5 +163,4 @@ TEST(Model, ThatIsChosenIsTheOneWithThatName) {
     }
 }
 
-}  // namespace model_test
-}  // namespace tubule
+}  // namespace tubule::model_test

@@ -10,8 +10,7 @@
 #include <thread>
 #include <vector>
 
-namespace tubule {
-namespace parallel_test {
+namespace tubule::parallel_test {
 
 class Parallel : public ::testing::Test {
 protected:
@@ -106,5 +105,4 @@ TEST_F(Parallel, IdleThreadsSleep) {
     EXPECT_LT(used, 0.03);  // of 0.1 s times three helpers
 }
 
-}  // namespace parallel_test
-}  // namespace tubule
+}  // namespace tubule::parallel_test

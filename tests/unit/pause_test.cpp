@@ -6,8 +6,7 @@
 #include "common/solve/memory.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace pause_test {
+namespace tubule::pause_test {
 
 bool never() {
     return false;
@@ -91,5 +90,4 @@ TEST(Memory, saysWhatIsTooLargeAndWhatToTry) {
     EXPECT_TRUE(message.ends_with(" GB are free: use fewer elements (discretisation.elements)")) << message;
 }
 
-}  // namespace pause_test
-}  // namespace tubule
+}  // namespace tubule::pause_test

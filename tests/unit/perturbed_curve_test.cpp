@@ -5,8 +5,9 @@
 
 #include <cmath>
 
-namespace tubule {
-namespace profile_curve_test {
+#include "tests/support/message_of.hpp"
+
+namespace tubule::profile_curve_test {
 
 // Parameters 0 ... 1 as tier axisym samples them: six equal steps an element, elements of lengths 1 and 2 in turn.
 std::vector<double> uneven(int elements) {
@@ -133,12 +134,7 @@ TEST(PerturbedCurve, OfASpline) {
 
 TEST(PerturbedCurve, Refusals) {
     const auto refusal = [](std::vector<double> r, std::vector<double> z, double length = 0) -> std::string {
-        try {
-            curve_through(r, z, length);
-        } catch (const std::invalid_argument& error) {
-            return error.what();
-        }
-        return "accepted";
+        return test::message_of<std::invalid_argument>([&] { curve_through(r, z, length); });
     };
     std::vector<double> r, z;
     for (int i = 0; i <= 12; ++i) r.push_back(std::sin(pi * i / 12)), z.push_back(-std::cos(pi * i / 12));
@@ -158,5 +154,4 @@ TEST(PerturbedCurve, Refusals) {
     EXPECT_EQ(refusal(doubled_r, doubled_z), "two neighbouring points of a profile coincide");
 }
 
-}  // namespace profile_curve_test
-}  // namespace tubule
+}  // namespace tubule::profile_curve_test

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/case/read.hpp"
+#include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace requirements_test {
+namespace tubule::requirements_test {
 
 const std::string tube = "[energy]\nk20 = 1\n[shape]\nkind = \"tube\"\nradius = 1\nlength = 2\n",
                   motion = "[time]\nend = 1\n";
@@ -173,12 +173,7 @@ const std::vector<Refused> refused_by_paper{
 };
 
 std::string refusal(const std::string& text, const std::vector<std::string>& sets) {
-    try {
-        parse_case(text, sets, "case.toml");
-        return "accepted";
-    } catch (const CaseError& error) {
-        return error.what();
-    }
+    return test::message_of<CaseError>([&] { parse_case(text, sets, "case.toml"); });
 }
 
 TEST(Requirements, EachMissingPropertyIsNamed) {
@@ -207,5 +202,4 @@ TEST(Requirements, EachMissingPropertyIsNamed) {
             EXPECT_TRUE(named.contains(row.key + row.instead + row.reason + need.words)) << row.key << need.words;
 }
 
-}  // namespace requirements_test
-}  // namespace tubule
+}  // namespace tubule::requirements_test

@@ -7,8 +7,7 @@
 #include "common/case/read.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace shapes_test {
+namespace tubule::shapes_test {
 
 const std::string energy = "[energy]\nk20 = 1.0\n";             // lines 2, 3
 const std::string surface = "tier = \"surface3d\"\n" + energy;  // line 1 and these
@@ -41,7 +40,7 @@ TEST(ShapeKeys, EveryShapeReadsBackAsWritten) {
         EXPECT_EQ(effective_toml(parse_case(written, {}, "again.toml")), written);
         for (const char* value : {"1.25", "scan.obj", "-2", "1e-06"})  // not lost on the way
             if (shapes[i].find(value) != std::string::npos) {
-                EXPECT_NE(written.find(value), std::string::npos) << written;
+                EXPECT_CONTAINS(written, value);
             }
     }
 }
@@ -89,9 +88,8 @@ TEST(ShapeKeys, ImpossibleShapes) {
     const auto refused = [](const std::string& keys) { return refusal(surface + shape(keys)); };
     EXPECT_EQ(refused("kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 0.1\nl = 2\nm = 3\n"),
               "case.toml:10:5: shape.mode.0.m must be an integer >= 0 and <= 2 (l), not 3");
-    EXPECT_NE(refused("kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 9\nl = 2\nm = 0\n")
-                  .find("case.toml:4:1: shape must have a positive radius everywhere, but it is -"),
-              std::string::npos);
+    EXPECT_CONTAINS(refused("kind = \"sphere\"\nradius = 1\n[[shape.mode]]\namplitude = 9\nl = 2\nm = 0\n"),
+                    "case.toml:4:1: shape must have a positive radius everywhere, but it is -");
     EXPECT_EQ(refused("kind = \"torus\"\nradius = 1\ntube_radius = 1\n"),
               "case.toml:7:15: shape.tube_radius must be below shape.radius: the torus intersects itself");
     EXPECT_EQ(refused("kind = \"file\"\n"), "case.toml:4:1: missing key shape.path: a string");
@@ -168,5 +166,4 @@ TEST(ModelKeys, WhatGoesTogether) {
               "the membrane: an inextensible model, or H0 that varies");
 }
 
-}  // namespace shapes_test
-}  // namespace tubule
+}  // namespace tubule::shapes_test

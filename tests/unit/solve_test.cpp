@@ -17,8 +17,7 @@
 #include "tests/support/message_of.hpp"
 #include "tests/support/screen.hpp"
 
-namespace tubule {
-namespace solve_test {
+namespace tubule::solve_test {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Vector = Eigen::VectorXd;
@@ -116,8 +115,7 @@ TEST(SparseLu, namesSingularMatrices) {
     // Row 2 is the sum of rows 0 and 1, in numbers that scaling and elimination leave exact.
     const Matrix dependent = matrix(3, {{0, 0, 2}, {0, 1, 1}, {1, 1, 1}, {1, 2, 2}, {2, 0, 2}, {2, 1, 2}, {2, 2, 2}});
     EXPECT_THROW(lu.factor(dependent), SolveError);
-    EXPECT_NE(message_of([&] { lu.factor(dependent); }).find("matrix of size 3 is singular: no pivot in column"),
-              std::string::npos);
+    EXPECT_CONTAINS(message_of([&] { lu.factor(dependent); }), "matrix of size 3 is singular: no pivot in column");
     // Column 1 is empty.
     EXPECT_EQ(message_of([&] {
                   lu.factor(matrix(3, {{0, 0, 1}, {1, 2, 1}, {2, 2, 1}, {2, 0, 1}}));
@@ -125,10 +123,10 @@ TEST(SparseLu, namesSingularMatrices) {
               "matrix of size 3 is singular: no pivot in column 1");
     // Rows differ by 1e-17 relative to their size after scaling: the condition number exceeds 1/epsilon = 4.5e15.
     const double e = std::numeric_limits<double>::epsilon();
-    EXPECT_NE(message_of([&] {
-                  lu.factor(matrix(2, {{0, 0, 1}, {0, 1, 1}, {1, 0, 1}, {1, 1, 1 + e}}));
-              }).find("matrix of size 2 is nearly singular: condition number about"),
-              std::string::npos);
+    EXPECT_CONTAINS(message_of([&] {
+                        lu.factor(matrix(2, {{0, 0, 1}, {0, 1, 1}, {1, 0, 1}, {1, 1, 1 + e}}));
+                    }),
+                    "matrix of size 2 is nearly singular: condition number about");
     EXPECT_EQ(message_of([&] { lu.solve(Vector::Ones(2)); }), "SparseSolver::solve needs factors: call factor() first");
     // It works again afterwards.
     lu.factor(ring(8));
@@ -213,8 +211,8 @@ TEST(DerivativeCheck, refusesWrongDerivatives) {
     }
     const DerivativeCheck check = Example{.error = 1}.check(state);
     EXPECT_NEAR(check.gradient.slope, 1, 0.02);
-    EXPECT_NE(check.text().find("gradient: WRONG, Taylor slope 1.0"), std::string::npos) << check.text();
-    EXPECT_NE(check.text().find("Hessian : right, Taylor slope 2.0"), std::string::npos) << check.text();
+    EXPECT_CONTAINS(check.text(), "gradient: WRONG, Taylor slope 1.0");
+    EXPECT_CONTAINS(check.text(), "Hessian : right, Taylor slope 2.0");
 }
 
 TEST(DerivativeCheck, toleratesNoise) {
@@ -238,7 +236,7 @@ TEST(DerivativeCheck, linearAndQuadraticFunctionsLeaveNoRemainder) {
     EXPECT_TRUE(linear.pass()) << linear.text();
     EXPECT_TRUE(std::isnan(linear.gradient.slope));
     EXPECT_TRUE(std::isnan(linear.hessian.slope));
-    EXPECT_NE(linear.text().find("gradient: correct, linear up to rounding"), std::string::npos);
+    EXPECT_CONTAINS(linear.text(), "gradient: correct, linear up to rounding");
 
     const Matrix A = Matrix(ring(12) + Matrix(ring(12).transpose()));
     const auto form = [&](const Vector& x) { return 0.5 * x.dot(A * x); };
@@ -279,7 +277,7 @@ TEST(DerivativeCheck, leavesOutInadmissibleSteps) {
     const auto only_here = check_derivatives([&](const Vector& y) { return y == x ? 1.0 : nan; },
                                              [&](const Vector&) { return x; }, hessian, x);
     EXPECT_FALSE(only_here.pass());
-    EXPECT_NE(only_here.text().find("gradient: NOT CHECKED"), std::string::npos) << only_here.text();
+    EXPECT_CONTAINS(only_here.text(), "gradient: NOT CHECKED");
 }
 
 TEST(DerivativeCheck, refusesWhatDoesNotFit) {
@@ -363,7 +361,7 @@ TEST(Progress, barOnATerminal) {
     // 24 marks at time 0.11 and 0.22 of 1 are 2 and 5; in the end the line is wiped.
     EXPECT_EQ(text.find("\r[##......................]  11%  time 0.11 of 1  energy 1  step 0.01  left 1 s\x1b[K"), 0u)
         << text;
-    EXPECT_NE(text.find("\r[#####...................]  22%"), std::string::npos) << text;
+    EXPECT_CONTAINS(text, "\r[#####...................]  22%");
     EXPECT_EQ(std::count(text.begin(), text.end(), '['), 2 + 3) << "two bars, three escape sequences";
     EXPECT_TRUE(text.ends_with("\r\x1b[K"));
 }
@@ -468,5 +466,4 @@ TEST(Interrupt, secondSignalEnds) {
     EXPECT_EQ(WTERMSIG(status), SIGINT);
 }
 
-}  // namespace solve_test
-}  // namespace tubule
+}  // namespace tubule::solve_test

@@ -16,8 +16,7 @@
 #include "common/shapes/profile_file.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace starts_test {
+namespace tubule::starts_test {
 
 using test::message_of;
 
@@ -106,7 +105,7 @@ TEST_F(ProfileFiles, NoiseIsSmoothedAway) {
         const auto p = fit.curve.at(i / 200.0);
         EXPECT_LT(from_spheroid(p[0], p[2]), 0.03);
     }
-    EXPECT_NE(fit.note().find("201 points"), std::string::npos);
+    EXPECT_CONTAINS(fit.note(), "201 points");
 }
 
 TEST_F(ProfileFiles, RunEitherWayWithOrWithoutTheLastPoint) {
@@ -144,12 +143,10 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
               "p.csv:4:1: r = -0.1: the profile meets the axis within; give one half of the "
               "outline, r >= 0, from pole to pole");
     EXPECT_EQ(refusal(half + ".8,-.5\n" + rest), "p.csv:4:1: the same point as before; remove one of the two");
-    EXPECT_NE(refusal(half + "1,0\n.9,-.9\n" + rest).find("p.csv:6:1: the profile crosses itself"), std::string::npos);
-    EXPECT_NE(refusal(half + rest.substr(0, rest.size() - 4) + ".1,1\n").find("p.csv:9:1: the profile is not closed"),
-              std::string::npos);
-    EXPECT_NE(refusal(".5,0\n.5,.1\n.5,.2\n.5,.3\n.5,.4\n.5,.5\n.5,.6\n.5,.7\n.5,.8\n.5,2\n", within(1e-3, 1))
-                  .find("p.csv:10:1: the profile rises by 2, more than shape.length = 1"),
-              std::string::npos);
+    EXPECT_CONTAINS(refusal(half + "1,0\n.9,-.9\n" + rest), "p.csv:6:1: the profile crosses itself");
+    EXPECT_CONTAINS(refusal(half + rest.substr(0, rest.size() - 4) + ".1,1\n"), "p.csv:9:1: the profile is not closed");
+    EXPECT_CONTAINS(refusal(".5,0\n.5,.1\n.5,.2\n.5,.3\n.5,.4\n.5,.5\n.5,.6\n.5,.7\n.5,.8\n.5,2\n", within(1e-3, 1)),
+                    "p.csv:10:1: the profile rises by 2, more than shape.length = 1");
     // One point so far away that squares are no numbers: this crashed.
     for (const double far : {1e97, 1e200}) {
         const auto path = points(120, [&](double t) {
@@ -163,7 +160,7 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     // A corner is no smooth curve.
     std::string cone;
     for (int i = 0; i <= 10; ++i) cone += fmt::format("{},{}\n", 0.1 * std::min(i, 10 - i), 0.1 * i);
-    EXPECT_NE(refusal(cone, within(1e-6)).find("set shape.tolerance to that"), std::string::npos);
+    EXPECT_CONTAINS(refusal(cone, within(1e-6)), "set shape.tolerance to that");
 }
 
 // ---- H0 of each point
@@ -247,23 +244,22 @@ TEST_F(ProfileFiles, H0OfTubesAndRingsRepeatsItself) {
 TEST_F(ProfileFiles, H0IsSmoothedToItsOwnTolerance) {
     // Every other value is off by 0.02: beyond the default tolerance, within another one.
     const std::string noisy = sphere_rows(200, [](int i) { return i % 2 == 0 ? 0.02 : -0.02; });
-    EXPECT_NE(refusal(noisy).find("no smooth H0 comes within 0.000302 of all 201 values: the best is 0.0"),
-              std::string::npos);
+    EXPECT_CONTAINS(refusal(noisy), "no smooth H0 comes within 0.000302 of all 201 values: the best is 0.0");
     ProfileFile how;
     how.H0_tolerance = 0.05;
     const FittedProfile fit = profile_in(write(noisy), how);
-    EXPECT_NE(fit.note().find("a smooth H0 at most 0.0"), std::string::npos) << fit.note();
+    EXPECT_CONTAINS(fit.note(), "a smooth H0 at most 0.0");
     for (int i = 0; i <= 100; ++i)
         EXPECT_NEAR(evaluate(*fit.H0, std::array{i / 100.0}.data()), domains(i / 100.0), 0.05);
     // A jump has no smooth function nearby; it is refused where it is.
     const std::string jump = sphere_rows(100, [](int i) { return i > 50 ? 1 : 0; });
     const std::string refused = refusal(jump);
     EXPECT_TRUE(refused.starts_with("p.csv:52:") || refused.starts_with("p.csv:53:")) << refused;
-    EXPECT_NE(refused.find("set shape.H0_tolerance to that, or give transitions a width"), std::string::npos);
+    EXPECT_CONTAINS(refused, "set shape.H0_tolerance to that, or give transitions a width");
     // So is a tube whose ends differ.
     std::string rows = "r,z,H0\n";
     for (int i = 0; i <= 40; ++i) rows += fmt::format("1,{:.17g},{:.17g}\n", i / 20.0, -1 - 0.01 * i);
-    EXPECT_NE(refusal(rows, within(1e-6, 2)).find("no smooth H0"), std::string::npos);
+    EXPECT_CONTAINS(refusal(rows, within(1e-6, 2)), "no smooth H0");
 }
 
 TEST_F(ProfileFiles, BadColumnsOfH0AreRefusedWithTheirPlace) {
@@ -317,15 +313,14 @@ TEST_F(ProfileFiles, H0OfACaseIsThatOfItsFile) {
     // What has no law for it.
     const std::string still =
         "shape.path has a column H0, but H0 must be a number: what varies is only valid with a table [time]";
-    EXPECT_NE(refused(text("", "", "surface3d")).find(still), std::string::npos);
+    EXPECT_CONTAINS(refused(text("", "", "surface3d")), still);
     const std::string automatic =
         "case.toml:6:8: shape.path has a column H0, but H0 must be a number: what varies is only valid with tier";
     EXPECT_TRUE(refused(text("", "[time]\nend = 1.0\n", "auto")).starts_with(automatic));
-    EXPECT_NE(refused(text("", "[equilibrium]\nmodes = 1\n")).find("only valid with a case without equilibrium.modes"),
-              std::string::npos);
-    EXPECT_NE(refused(text("", "[time]\nend = 1.0\n[discretisation]\nparametrisation = \"even\"\n"))
-                  .find("must not be \"even\": only valid with a number energy.H0"),
-              std::string::npos);
+    EXPECT_CONTAINS(refused(text("", "[equilibrium]\nmodes = 1\n")),
+                    "only valid with a case without equilibrium.modes");
+    EXPECT_CONTAINS(refused(text("", "[time]\nend = 1.0\n[discretisation]\nparametrisation = \"even\"\n")),
+                    "must not be \"even\": only valid with a number energy.H0");
     // A file that is wrong says so with its place.
     write(sphere_rows(20) + "1,2\n");
     EXPECT_TRUE(refused(text("")).starts_with("p.csv:23:3: has 2 values"));
@@ -364,7 +359,7 @@ TEST(FormulaShapes, AreTheBuiltInOnes) {
 
 TEST(FormulaShapes, ThatAreNoSurfacesAreRefused) {
     const auto expect = [](const FormulaShape& which, const std::string& words) {
-        EXPECT_NE(complaint(which).find(words), std::string::npos) << complaint(which);
+        EXPECT_CONTAINS(complaint(which), words);
     };
     EXPECT_EQ(complaint(shape("1 + 0.1*cos(pi*z)*cos(2*theta)", 2)), "");
     EXPECT_EQ(complaint(shape("1 + 0.1*sin(theta)*cos(phi) + 0.05*cos(theta)")), "");
@@ -426,10 +421,9 @@ TEST(Noise, OfSpheresLeavesRadiusAndPlace) {
 
 TEST(Noise, AroundTheAxisNeedsThreeDimensions) {
     const std::string tube = "kind = \"tube\"\nradius = 1.0\nlength = 2.0\n[[shape.noise]]\namplitude = 0.01\nm = 2\n";
-    EXPECT_NE(message_of<CaseError>([&] { read(tube, "axisym"); }).find("shape.noise.0.m must be 0"),
-              std::string::npos);
+    EXPECT_CONTAINS(message_of<CaseError>([&] { read(tube, "axisym"); }), "shape.noise.0.m must be 0");
     const std::string large = "kind = \"tube\"\nradius = 1.0\nlength = 2.0\n[[shape.noise]]\namplitude = 2.0\n";
-    EXPECT_NE(message_of<CaseError>([&] { read(large); }).find("must have r0(z) > 0 everywhere"), std::string::npos);
+    EXPECT_CONTAINS(message_of<CaseError>([&] { read(large); }), "must have r0(z) > 0 everywhere");
 }
 
 TEST(StartVelocity, NeedsAFrame) {
@@ -437,11 +431,8 @@ TEST(StartVelocity, NeedsAFrame) {
         "tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[model]\nkind = \"fluid\"\n[velocity]\ninitial = "
         "\"result\"\n[shape]\n"
         "kind = \"sphere\"\nradius = 1.0\n[time]\nend = 1.0\n";
-    EXPECT_NE(message_of<CaseError>([&] {
-                  parse_case(text, {}, "case.toml");
-              }).find("must not be \"result\": only valid with shape.kind = \"result\""),
-              std::string::npos);
+    EXPECT_CONTAINS(message_of<CaseError>([&] { parse_case(text, {}, "case.toml"); }),
+                    "must not be \"result\": only valid with shape.kind = \"result\"");
 }
 
-}  // namespace starts_test
-}  // namespace tubule
+}  // namespace tubule::starts_test

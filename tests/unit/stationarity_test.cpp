@@ -9,8 +9,7 @@
 #include "common/run/energy_checks.hpp"
 #include "tests/support/message_of.hpp"
 
-namespace tubule {
-namespace stationarity_test {
+namespace tubule::stationarity_test {
 
 constexpr double area = 4 * pi;  // of size 1
 
@@ -96,10 +95,9 @@ TEST(ErrorScale, DoubtsWhatHidesTheEnergyOrItsFall) {
     EXPECT_EQ(doubt_before(c, -1, 100), "");
     EXPECT_NE(doubt_before(c, 0.9, 100), "");
     EXPECT_EQ(doubt_after(c, Stop::finished, 10, 9, 100), "");
-    EXPECT_NE(doubt_after(c, Stop::finished, 10, 9.1, 100).find("set accuracy.energy below 0.009"), std::string::npos);
+    EXPECT_CONTAINS(doubt_after(c, Stop::finished, 10, 9.1, 100), "set accuracy.energy below 0.009");
     EXPECT_EQ(doubt_after(c, Stop::pinch_off, 10, 9.1, 100), "");
     EXPECT_EQ(doubt_after(c, Stop::finished, 10, 10, 100), "") << "it was at rest";
 }
 
-}  // namespace stationarity_test
-}  // namespace tubule
+}  // namespace tubule::stationarity_test

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace tubule::theory {
-namespace vesiculation_test {
+namespace tubule::theory::vesiculation_test {
 
 using std::numbers::pi;
 
@@ -91,5 +90,4 @@ TEST(Vesiculation, NoneWhereNecksCostMore) {
     EXPECT_FALSE(vesiculated_limit(helfrich(-3), area, volume(1.01)));
 }
 
-}  // namespace vesiculation_test
-}  // namespace tubule::theory
+}  // namespace tubule::theory::vesiculation_test

@@ -4,8 +4,7 @@
 #include "tests/axisym/reference.hpp"
 #include "tests/axisym/runs.hpp"
 
-namespace tubule::axisym {
-namespace critical_amplitude_test {
+namespace tubule::axisym::critical_amplitude_test {
 
 TEST(CriticalAmplitudeStudy, agreesWithTheReferenceToItsBracket) {
     const auto pinches = [](double amplitude) {
@@ -20,5 +19,4 @@ TEST(CriticalAmplitudeStudy, agreesWithTheReferenceToItsBracket) {
     EXPECT_TRUE(pinches(reference::pinches_at));
 }
 
-}  // namespace critical_amplitude_test
-}  // namespace tubule::axisym
+}  // namespace tubule::axisym::critical_amplitude_test

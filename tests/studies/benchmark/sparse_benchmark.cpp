@@ -8,7 +8,9 @@
 #include <umfpack.h>
 
 #include <chrono>
+#include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 
 #include "common/solve/gmres.hpp"

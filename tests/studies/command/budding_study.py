@@ -139,25 +139,14 @@ class Budding(ProgramTest):
         path = self.write(
             "branch.toml",
             f"""tier = "axisym"
-[energy]
-k20 = {K}
-alpha = {ALPHA}
-M0 = {start}
-[shape]
-kind = "ellipsoid"
-a = 1.0
-b = 1.0
-c = 1.5
-[accuracy]
-energy = 1e-9
+energy = {{k20 = {K}, alpha = {ALPHA}, M0 = {start}}}
+shape = {{kind = "ellipsoid", a = 1.0, b = 1.0, c = 1.5}}
+accuracy = {{energy = 1e-9}}
 [equilibrium]
 area = {4 * np.pi!r}
 reduced_volume = {v}
 family = "prolate"
-[equilibrium.branch]
-vary = "energy.M0"
-to = {end}
-step = 1.0
+branch = {{vary = "energy.M0", to = {end}, step = 1.0}}
 """,
         )
         self.tubule("run", path, "--quiet", "--overwrite", "-o", self.result)

@@ -29,7 +29,7 @@ from sandbox import Finding, Sandbox
 #     one(rng, box)    makes and judges one case, all of it drawn from `rng`, in the Sandbox `box`: a word for the counts,
 #                      such as "refused" or "finished"; raises Finding
 FUZZERS = (
-    "cases", "scenes", "surfaces", "loads", "auto", "results", "kills", "resumes", "memory", "meshes", "starts", "commands", "pages", "arguments", "coverage",
+    "cases", "scenes", "surfaces", "loads", "auto", "results", "memory", "meshes", "starts", "commands", "coverage",
 )  # fmt: skip
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What judges the results and pages of the fuzzers sees what is spoilt, and its energies are those of closed forms.
+"""What judges the results of the fuzzers sees what is spoilt, and its energies are those of closed forms.
 
     judges_test.py TUBULE
 """
@@ -13,7 +13,6 @@ import unittest
 from pathlib import Path
 
 import h5py
-import pages
 import rows
 from samples import TUBE
 from sandbox import Finding
@@ -60,13 +59,6 @@ class Rows(unittest.TestCase):
         axes = ({"a": 1, "b": 1, "c": 1.5}, {"a": 1.5, "b": 1, "c": 1})
         turned = [rows.given_energy({"shape": {"kind": "ellipsoid"} | a, "energy": energy}) for a in axes]
         self.assertAlmostEqual(*turned, places=9)
-
-
-class Pages(unittest.TestCase):
-    def test_scripts_within_comments_of_scripts(self):
-        self.assertEqual(pages.scripts('<script id="data">{"<!--": 1}</script><script>x</script>'), [(' id="data"', '{"<!--": 1}'), ("", "x")])
-        with self.assertRaises(Finding):
-            pages.scripts('<script id="data">{"<!--<script>": 1}</script> and no more')
 
 
 if __name__ == "__main__":

@@ -43,8 +43,6 @@ SCAN = ("scan", "tube.toml", "--over=energy.k42=0,0.1,0.2", "--jobs=1", "--quiet
 
 # The tube with 400 frames, for a second or so: time to be disturbed. Explicit settings: it never begins again.
 SLOW = TUBE.replace("[0.01, 0.05]", str([i / 2000 for i in range(1, 400)]) + ", max_order = 2") + "discretisation = {elements = 40, time_tolerance = 1e-12}\n"
-# Its rows, up to this.
-SLOW_ERROR = 1e-4
 
 
 @dataclass

@@ -6,11 +6,10 @@ asked for a thirtieth of the accuracy; where they differ by more than the run st
 splines of another degree and a thirtieth of that. A finished run without a warning is *silent* if its error is above
 twice the stated one or above what was asked.
 
-    scenes.py TUBULE [--before TUBULE] [--first N] [--count N] [--save FILE] [--ensembles] [--places | --beads | --patches]
+    scenes.py TUBULE [--first N] [--count N] [--save FILE] [--ensembles] [--places | --beads | --patches]
 
-prints how true and stated errors compare over many scenes, for a program and for one of before: a run that finishes
-rightly with that one and now stops or does not know its error is a *false alarm*. With --ensembles, every scene has
-random rules and loads; otherwise every other one. With --places, all are closed surfaces at a wall, a particle or in a field; where
+prints how true and stated errors compare over many scenes. With --ensembles, every scene has random rules and loads;
+otherwise every other one. With --places, all are closed surfaces at a wall, a particle or in a field; where
 their volume is free, most are under osmosis. With --beads, two beads draw a closed surface apart, by a force or by an extension. With --patches,
 all are patches in rings, some with a bead.
 
@@ -321,47 +320,26 @@ def scene_number(n, ensembles, at):
     return scene(random.Random(f"scene {n}"), ensembles, at)
 
 
-def judge(n, case, programs, top):
-    boxes = {name: Sandbox(program.resolve(), Path(top) / f"{n} {name}") for name, program in programs.items()}
-    reference = Reference(boxes["now"], case)
-    line = {"scene": n, "asked": case["accuracy"]["energy"], "model": case["model"]["kind"], "shape": case["shape"]["kind"]}
-    for name, box in boxes.items():
-        run = Run(box, case)
-        error = reference.error(run) if run.finished else None
-        line[name] = {
-            "stop": run.stop,
-            "verdict": verdict(run, line["asked"], error),
-            "stated": run.stated,
-            "error": error and error[0],
-            "seconds": run.seconds,
-        }
-    return line
+def judge(n, case, program, top):
+    box = Sandbox(program.resolve(), Path(top) / str(n))
+    run = Run(box, case)
+    error, asked = Reference(box, case).error(run) if run.finished else None, case["accuracy"]["energy"]
+    return {"scene": n, "asked": asked, "model": case["model"]["kind"], "shape": case["shape"]["kind"], "stop": run.stop,
+            "verdict": verdict(run, asked, error), "stated": run.stated, "error": error and error[0], "seconds": run.seconds}  # fmt: skip
 
 
 def report(lines):
-    for name in ("now", "before"):
-        of = [x[name] for x in lines if name in x]
-        counts = {v: sum(x["verdict"] == v for x in of) for v in ("right", "silent", "told", "stopped", "undecided")}
-        ratios = sorted(x["error"] / x["stated"] for x in of if x["verdict"] in ("right", "silent"))
-        if not ratios:
-            continue
+    counts = {v: sum(x["verdict"] == v for x in lines) for v in ("right", "silent", "told", "stopped", "undecided")}
+    ratios = sorted(x["error"] / x["stated"] for x in lines if x["verdict"] in ("right", "silent"))
+    print(f"{counts}, {sum(x['seconds'] for x in lines):.1f} s of processor")
+    if ratios:
         above = sum(r > 1 for r in ratios)
-        print(f"{name}: {counts}, {sum(x['seconds'] for x in of):.1f} s of processor")
         print(f"    true/stated: median {ratios[len(ratios) // 2]:.3f}, above 1: {above} of {len(ratios)}, largest {ratios[-1]:.3g}")
-    right = [x for x in lines if "before" in x and x["before"]["verdict"] == "right"]
-    if right:
-        alarms = [x["scene"] for x in right if x["now"]["verdict"] in ("told", "stopped")]
-        gained = [x["scene"] for x in lines if x["before"]["verdict"] in ("told", "stopped", "silent") and x["now"]["verdict"] == "right"]
-        both = [x for x in right if x["scene"] not in alarms]
-        now, before = (sum(x[name]["seconds"] for x in both) for name in ("now", "before"))
-        print(f"false alarms: {len(alarms)} of {len(right)} {alarms}; right only now: {len(gained)} {gained}")
-        print(f"processor time of those that are right in both: {now:.1f} s, before {before:.1f} s, ratio {now / before:.3f}")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=Path)
-    parser.add_argument("--before", type=Path)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--save", type=Path, help="a line of JSON for each scene")
@@ -374,15 +352,14 @@ def main():
     if a.print is not None:
         print(toml.dump(scene_number(a.print, a.ensembles, a.at)), end="")
         return 0
-    programs = {"now": a.program} | ({"before": a.before} if a.before else {})
     lines = []
     for n in range(a.first, a.first + a.count):
         with tempfile.TemporaryDirectory() as top:
-            lines.append(judge(n, scene_number(n, a.ensembles, a.at), programs, top))
+            lines.append(judge(n, scene_number(n, a.ensembles, a.at), a.program, top))
         if a.save:
             a.save.write_text("".join(json.dumps(x) + "\n" for x in lines))
     report(lines)
-    silent = [x for x in lines if x["now"]["verdict"] == "silent"]
+    silent = [x for x in lines if x["verdict"] == "silent"]
     for x in silent:
         print(f"silent: {x}")
     return 1 if silent else 0

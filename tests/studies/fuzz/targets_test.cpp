@@ -7,8 +7,7 @@
 #include <random>
 #include <span>
 
-namespace tubule::fuzz {
-namespace targets_test {
+namespace tubule::fuzz::targets_test {
 
 class Readers : public testing::TestWithParam<Target> {};
 
@@ -29,5 +28,4 @@ TEST_P(Readers, ReadOrRefuse) {
 INSTANTIATE_TEST_SUITE_P(Fuzz, Readers, testing::ValuesIn(targets()),
                          [](const auto& target) { return std::string(target.param.name); });
 
-}  // namespace targets_test
-}  // namespace tubule::fuzz
+}  // namespace tubule::fuzz::targets_test

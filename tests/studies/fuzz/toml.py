@@ -1,6 +1,5 @@
 """Case files as data that can be changed and written again."""
 
-import random
 import tomllib
 
 

@@ -6,7 +6,6 @@
 The true error is the difference to the shape with a tenth of the stated error as the tolerance: the same sequence of meshes
 goes on.
 """
-import math
 import random
 import subprocess
 import sys
