@@ -127,7 +127,7 @@ class Units(ProgramTest):
         self.addCleanup(os.environ.pop, "TUBULE_PROGRAM")
         self.tubule("run", "case.toml", *GRADIENT_FLOW)
         for options, words, never in (
-            ((), ("time t (whole run) [\u00b5s]", "bending energy E [kT]", "80 nm", "Gaussian curvature K (right halves) [1/nm\u00b2]",
+            ((), ("time t (whole run) [\u00b5s]", "bending energy E [kT]", "80 nm", "Gaussian curvature K [1/nm\u00b2] (right halves)",
                   "t\u2082 = 0.07592 \u00b5s"), "time t"),
             (("--units", "none"), ("time t (whole run)", "bending energy E"), "[kT]"),
             (("--series", "r_max", "--units", "length=2 um", "--to", "0.1"), ("largest radius [\u00b5m]", "time t [s]"), "time t"),

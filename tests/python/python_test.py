@@ -670,7 +670,7 @@ class Drawing(Folder):
         result = tubule.run(TUBE)
         for options, words in (({"output": "x.jpg"}, "one of .png"), ({"kind": "all of it"}, "is not one of"),
                                ({"kind": "surface"}, "no surfaces"), ({"times": [7]}, "no result has a frame"),
-                               ({"dpi": 5}, "not between 30 and 1200"), ({"colour": ["T"]}, "is not one of u_n"),
+                               ({"dpi": 5}, "not between 30 and 1200"), ({"colour": ["T"]}, "is not one of H, K"),
                                ({"plane": ("w", 0)}, "is not x, y or z"), ({"times": [float("nan")]}, "not a list of numbers"),
                                ({"quantity": "energy"}, "belong to scans")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, words):

@@ -17,7 +17,7 @@ COVERED = 0.98  # part of the membrane area whose curvature is inside the colour
 MARGIN = 1.25  # the colour scale extends beyond that by this factor
 WHOLE = 2.2  # and up to the last value if that is within this factor
 FAR = 0.5  # of the range of values: from there on white is their mean
-LONG = 50  # letters of a label above which it has two lines
+LONG, LETTER = 50, 0.047  # letters of a label above which it has two lines, and inches of one
 BAR_HEIGHT = 0.66  # inches of a colour bar with its label
 ROUNDING = 1e-9  # a uniform tube has K = 0 up to this; the colour scale must not magnify it
 MAPS = {"H": "PuOr", "K": "RdBu_r", "H0": "PuOr", "p": "PRGn"}
@@ -123,16 +123,16 @@ def draw_bars(figure, bottom, shown):
 
 def draw_bar(figure, bottom, left, width, mappable, label, extend="neither"):
     """One colour bar in the 0.5 inches above `bottom`; `left` and `width` are parts of the page."""
-    height = figure.get_figheight()
+    height, inches = figure.get_figheight(), width * figure.get_figwidth()
     axes = figure.add_axes([left, (bottom + 0.38) / height, width, 0.09 / height])
     bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=extend)
     bar.outline.set_linewidth(0.5)
-    if len(label) > LONG:
+    if len(label) > min(LONG, inches / LETTER):
         name, _, rest = label.partition(",")
         label = f"{name}\n{rest.strip()}" if rest else label
     bar.set_label(label, labelpad=2, fontsize=8 if "\n" not in label else 7)
     bar.ax.tick_params(width=0.5, length=2.5)
-    bar.locator = MaxNLocator(5)
+    bar.locator = MaxNLocator(max(2, min(5, int(inches / 0.4))))
     bar.formatter = FuncFormatter(lambda value, _: number(value))
     bar.solids.set_rasterized(True)
     bar.solids.set_edgecolor("face")
