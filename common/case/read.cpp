@@ -15,15 +15,6 @@ namespace {
 
 constexpr std::size_t most_of_profile = 32 * megabyte;
 
-void note_places(const toml::node& node, const std::string& path, std::map<std::string, std::string>& places) {
-    if (!path.empty()) places[path] = place(node.source());
-    const std::string prefix = path.empty() ? "" : path + ".";
-    if (const auto* list = node.as_array())
-        for (std::size_t i = 0; i < list->size(); ++i) note_places(*list->get(i), prefix + std::to_string(i), places);
-    if (const auto* table = node.as_table())
-        for (const auto& [key, value] : *table) note_places(value, prefix + std::string(key.str()), places);
-}
-
 // Terms of the case that are those of the list, with the branch that varies one of them. Messages find them where they
 // stand.
 void merge_terms(Case& c) {
@@ -126,7 +117,10 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
         c = read_keys(root, sets, path, std::move(H0)), place();  // other conditions hold
     c.text = text;
     c.sets = sets;
-    note_places(root, "", c.places);
+    walk(root, "", [&](const std::string& key, const toml::node& node) {
+        if (!key.empty()) c.places[key] = tubule::place(node.source());
+        return true;
+    });
     if (!renamed.empty()) c.places["discretisation.time_order"] = renamed;
     merge_terms(c);
     std::visit(

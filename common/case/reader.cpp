@@ -135,7 +135,9 @@ void Reader::refuse_unknown() {
     for (const auto& [key, node] : table_) {
         const std::string name(key.str());
         if (std::find(names_.begin(), names_.end(), name) != names_.end() || (accepts_ && accepts_(name))) continue;
-        const OtherName* other = other_name(path_, name);
+        // Names of a case; the file of a scan has other tables.
+        const bool is_case = !path_.empty() || std::ranges::find(names_, "tier") != names_.end();
+        const OtherName* other = is_case ? other_name(path_, name) : nullptr;
         const std::string suggestion = other ? std::string(other->key) : near_miss(name, names_).value_or("");
         if (in_doubt && suggestion.empty() && !other) continue;
         meant_.push_back(suggestion);
@@ -176,6 +178,18 @@ void Reader::text(const std::string& key, std::string& target, bool needed, cons
     collect([&] {
         if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
         target = node->as_string()->get();
+    });
+}
+
+void Reader::texts(const std::string& key, std::vector<std::string>& target) {
+    const std::string what = "a list of strings";
+    const toml::node* node = find(key, what, false);
+    if (!node) return;
+    collect([&] {
+        for (const toml::node& item : as_list(*node, path_of(key), what)) {
+            if (!item.is_string()) refuse_value(where(item), path_of(key), what, item);
+            target.push_back(item.as_string()->get());
+        }
     });
 }
 

@@ -64,6 +64,7 @@ public:
 
     void flag(const std::string& key, bool& target);
     void text(const std::string& key, std::string& target, bool needed = false, const std::string& what = "a string");
+    void texts(const std::string& key, std::vector<std::string>& target);
     void increasing(const std::string& key, std::vector<double>& target, const Range& range, bool needed = false);
 
     void numbers(const std::string& key, std::vector<double>& target, bool needed = false);

@@ -8,7 +8,6 @@
 
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
-#include "common/case/toml_mistakes.hpp"
 
 namespace tubule {
 namespace {

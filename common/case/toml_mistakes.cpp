@@ -1,5 +1,3 @@
-#include "common/case/toml_mistakes.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "common/case/text.hpp"
+#include "common/case/toml_input.hpp"
 
 namespace tubule {
 namespace {

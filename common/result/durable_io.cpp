@@ -62,11 +62,6 @@ void File::write(std::span<const std::byte> bytes) {
     }
 }
 
-void File::truncate(std::size_t size) {
-    const bool done = allowed({Call::truncate, fd_, {}}) && ::ftruncate(fd_, static_cast<off_t>(size)) == 0;
-    if (!done) fail("truncate", path_, errno);
-}
-
 void File::sync() {
     while (!(allowed({Call::sync, fd_, {}}) && ::fsync(fd_) == 0)) {
         if (errno != EINTR) fail("sync", path_, errno);

@@ -10,11 +10,11 @@
 
 namespace tubule::durable {
 
-enum class Call { open, write, truncate, sync, rename, remove };
+enum class Call { open, write, sync, rename, remove };
 
 struct Operation {
     Call call;
-    int fd = -1;                       // of write, truncate and sync
+    int fd = -1;                       // of write and sync
     std::span<const std::byte> bytes;  // that write is about to write
 };
 
@@ -40,7 +40,6 @@ public:
     const std::filesystem::path& path() const { return path_; }
 
     void write(std::span<const std::byte> bytes);  // all of them, in one write(2) where the system can
-    void truncate(std::size_t size);
     void sync();
 
 private:

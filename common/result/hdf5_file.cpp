@@ -15,7 +15,6 @@
 
 #include "common/energy/bending.hpp"
 #include "common/result/checksums.hpp"
-#include "common/result/contents.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "common/result/start_frame.hpp"
@@ -41,24 +40,18 @@ void put_record(hid_t parent, const std::string& name, const Record& record, con
         put_grid(group, record, meshes[*record.mesh]);
         return;
     }
-    for (const Array& array : record.arrays)
-        put_dataset(group, array.name, H5T_NATIVE_DOUBLE, space(array.shape), array.data.data());
+    for (const Array& array : record.arrays) put_dataset(group, array.name, array.data, array.shape);
 }
 
 void put_series(hid_t file, const Contents& contents) {
     const auto group = make_group(file, "series");
-    put_attribute(group, "order", contents.series);
-    const std::size_t width = contents.series.size();
-    std::vector<double> column(contents.rows.size() / width);
-    for (std::size_t j = 0; j < width; ++j) {
-        for (std::size_t i = 0; i < column.size(); ++i) column[i] = contents.rows[i * width + j];
-        const auto data =
-            put_dataset(group, contents.series[j], H5T_NATIVE_DOUBLE, space({column.size()}), column.data());
-        if (const SeriesEntry* entry = find_series(contents.series[j])) {
+    put_attribute(group, "order", contents.series_names);
+    for (const std::string& name : contents.series_names) {
+        const auto data = put_dataset(group, name, contents.series.at(name));
+        if (const SeriesEntry* entry = find_series(name)) {
             put_attribute(data, "unit", std::string(entry->unit));
-            put_attribute(data, "meaning", meaning_of(*entry, contents.series[j]));
-            if (const auto term = energy_part(contents.series[j]); !term.empty())
-                put_attribute(data, "label", term_label(term));
+            put_attribute(data, "meaning", meaning_of(*entry, name));
+            if (const auto term = energy_part(name); !term.empty()) put_attribute(data, "label", term_label(term));
         }
     }
 }
@@ -84,7 +77,7 @@ void put_segments(hid_t file, hid_t frames, const std::vector<Segment>& segments
 }
 
 std::size_t size_estimate(const Contents& contents) {
-    std::size_t doubles = contents.rows.size();
+    std::size_t doubles = contents.rows() * contents.series_names.size();
     for (std::size_t i = contents.frames_in_segments(); i < contents.frames.size(); ++i)
         for (const Array& array : contents.frames[i].arrays) doubles += array.data.size();
     std::size_t integers = 0;
@@ -113,17 +106,16 @@ Record get_record(hid_t parent, const std::string& name, const std::vector<Surfa
     Record record;
     const auto group = open_group(parent, name);
     for (const std::string& key : attribute_names(group)) {
-        const auto attribute = open_attribute(group, key);
         if (key == "mesh")
-            record.mesh = get_attribute<std::size_t>(attribute, H5T_NATIVE_UINT64, key);
+            record.mesh = get_number<std::uint64_t>(group, key);
         else if (key == "kind")
-            record.kind = record_kind(fmt::format("{}", fmt::join(get_texts(attribute, key), " ")));
+            record.kind = record_kind(fmt::format("{}", fmt::join(get_texts(group, key), " ")));
         else if (is_of_the_grid(key))
             continue;
         else if (key == "time")
-            record.time = get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, key);
+            record.time = get_number<double>(group, key);
         else
-            record.numbers.emplace_back(key, get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, key));
+            record.numbers.emplace_back(key, get_number<double>(group, key));
     }
     if (record.mesh) {
         if (*record.mesh >= meshes.size())
@@ -138,30 +130,17 @@ Record get_record(hid_t parent, const std::string& name, const std::vector<Surfa
     return record;
 }
 
-std::string get_one_text(hid_t dataset) {
-    const Handle extent(H5Dget_space(dataset), H5Sclose, "read", "case");
-    require(H5Sget_simple_extent_npoints(extent) == 1, "read as one string", "case");
-    const auto type = text_type();
-    char* data = nullptr;
-    require(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &data) >= 0, "read", "case");
-    std::string text = data ? data : "";
-    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, &data);
-    return text;
-}
-
 void get_series(hid_t file, Contents& contents) {
     const auto group = open_group(file, "series");
-    contents.series = get_texts(open_attribute(group, "order"), "order");
-    const std::size_t width = contents.series.size();
-    for (std::size_t j = 0; j < width; ++j) {
-        const auto column = get_array(group, contents.series[j]).data;
-        require_finite(column, "series " + contents.series[j]);
-        if (j == 0) contents.rows.resize(column.size() * width);
-        if (column.size() * width != contents.rows.size())
-            throw std::runtime_error(
-                fmt::format("series {} and {} differ in length", contents.series[0], contents.series[j]));
-        for (std::size_t i = 0; i < column.size(); ++i) contents.rows[i * width + j] = column[i];
+    contents.series_names = get_texts(group, "order");
+    for (const std::string& name : contents.series_names) {
+        std::vector<double>& column = contents.series[name] = get_array(group, name).data;
+        require_finite(column, "series " + name);
+        const std::string& first = contents.series_names.front();
+        if (column.size() != contents.series.at(first).size())
+            throw std::runtime_error(fmt::format("series {} and {} differ in length", first, name));
     }
+    if (!contents.series.contains("time")) throw std::runtime_error("/series/time is missing");
 }
 
 void require_parts(hid_t file) {
@@ -176,7 +155,7 @@ void require_parts(hid_t file) {
 std::vector<Segment> get_segments(hid_t file) {
     std::vector<Segment> segments;
     if (H5Aexists(file, "segments") <= 0) return segments;
-    for (const std::string& words : get_texts(open_attribute(file, "segments"), "segments")) {
+    for (const std::string& words : get_texts(file, "segments")) {
         std::istringstream in(words);
         Segment segment{};
         in >> segment.end >> segment.crc >> std::ws;
@@ -202,21 +181,18 @@ void require_segments(hid_t file, const std::filesystem::path& folder) {
 
 CaseText get_case(hid_t file) {
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
-    CaseText out{get_one_text(text), get_texts(open_attribute(text, "set"), "set"), get_inputs(file)};
-    if (has(file, "resolved_case"))
-        out.resolved = get_one_text(Handle(H5Dopen2(file, "resolved_case", H5P_DEFAULT), H5Dclose, "open", "case"));
+    CaseText out{get_text_dataset(file, "case"), get_texts(text, "set"), get_inputs(file)};
+    if (has(file, "resolved_case")) out.resolved = get_text_dataset(file, "resolved_case");
     return out;
 }
 
 Contents get_contents(hid_t file) {
     Contents contents;
-    contents.about_begun =
-        get_attribute<std::uint64_t>(open_attribute(file, "about_begun"), H5T_NATIVE_UINT64, "about_begun");
+    contents.about_begun = get_number<std::uint64_t>(file, "about_begun");
     contents.case_text = get_case(file);
     contents.segments = get_segments(file);
     const auto about = open_group(file, "about");
-    for (const std::string& name : attribute_names(about))
-        contents.about.emplace_back(name, get_value(open_attribute(about, name), name));
+    for (const std::string& name : attribute_names(about)) contents.about.emplace_back(name, get_value(about, name));
     get_series(file, contents);
     if (has(file, "meshes")) {
         const auto meshes = open_group(file, "meshes");
@@ -263,10 +239,8 @@ std::vector<std::byte> hdf5_image(const Contents& contents) {
     // Grows in steps of the expected size, so that it is rarely reallocated.
     const auto file = make_image(std::max<std::size_t>(size_estimate(contents), 1 << 16));
     put_attribute(file, "about_begun", contents.about_begun);
-    const char* text = contents.case_text.text.c_str();
-    put_attribute(put_dataset(file, "case", text_type(), scalar(), &text), "set", contents.case_text.sets);
-    if (const char* resolved = contents.case_text.resolved.c_str(); *resolved)
-        put_dataset(file, "resolved_case", text_type(), scalar(), &resolved);
+    put_attribute(put_dataset(file, "case", contents.case_text.text), "set", contents.case_text.sets);
+    if (!contents.case_text.resolved.empty()) put_dataset(file, "resolved_case", contents.case_text.resolved);
     put_inputs(file, contents.case_text.inputs);
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : contents.about)
@@ -323,17 +297,9 @@ void require_result(const std::filesystem::path& file) {
 }
 
 std::vector<std::byte> result_image(const Result& result) {
-    Contents contents;
+    Contents contents{result};
     contents.about_begun = result.about.size();
-    contents.case_text = result.case_text, contents.case_text.resolved = resolved_case(result.case_text);
-    contents.about = result.about, contents.series = result.series_names;
-    const std::size_t width = contents.series.size(), rows = result.series.at("time").size();
-    contents.rows.resize(width * rows);
-    for (std::size_t j = 0; j < width; ++j) {
-        const std::vector<double>& column = result.series.at(contents.series[j]);
-        for (std::size_t i = 0; i < rows; ++i) contents.rows[i * width + j] = column[i];
-    }
-    contents.meshes = result.meshes, contents.frames = result.frames, contents.checkpoint = result.checkpoint;
+    contents.case_text.resolved = resolved_case(result.case_text);
     return hdf5_image(contents);
 }
 

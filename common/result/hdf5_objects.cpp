@@ -26,24 +26,30 @@ std::string last_error() {
     return words;
 }
 
-// name(buffer, size) fills a buffer and returns the length, as HDF5's functions do.
-template <class Name>
-std::string name_of(const Name& name) {
-    const ssize_t length = name(nullptr, 0);
-    require(length >= 0, "read", "a name");
-    std::string text(static_cast<std::size_t>(length), '\0');
-    name(text.data(), text.size() + 1);
-    return text;
-}
-
 // For what HDF5 keeps of an open file, and so much more.
 void require_room(std::size_t bytes) {
     constexpr std::size_t room = 16 << 20;
     if (!can_allocate(room + bytes)) throw std::bad_alloc();
 }
 
-H5_index_t index_of(unsigned order) {
-    return (order & H5P_CRT_ORDER_TRACKED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
+// The names of `count` attributes or members; `order_of` and `name_of` are HDF5's functions for these.
+template <class Order, class Name>
+std::vector<std::string> names_in_order(hid_t group, hsize_t count, const Order& order_of, const Name& name_of) {
+    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
+    unsigned order = 0;
+    order_of(how, &order);
+    const H5_index_t index = (order & H5P_CRT_ORDER_TRACKED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
+    std::vector<std::string> names;
+    for (hsize_t i = 0; i < count; ++i) {
+        const auto read = [&](char* into, std::size_t size) {
+            return name_of(group, ".", index, H5_ITER_INC, i, into, size, H5P_DEFAULT);
+        };
+        const ssize_t length = read(nullptr, 0);
+        require(length >= 0, "read", "a name");
+        std::string& name = names.emplace_back(static_cast<std::size_t>(length), '\0');
+        read(name.data(), name.size() + 1);
+    }
+    return names;
 }
 
 // A dataset to read, and its extent.
@@ -57,6 +63,25 @@ struct Opened {
         require(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, into) >= 0, "read", name);
     }
 };
+
+std::vector<const char*> pointers_to(const std::vector<std::string>& texts) {
+    std::vector<const char*> out;
+    for (const std::string& text : texts) out.push_back(text.c_str());
+    return out;
+}
+
+// Texts that read(type, where to) has HDF5 allocate.
+template <class Read>
+std::vector<std::string> texts_of(hid_t extent, const Read& read) {
+    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
+    if (data.empty()) return {};
+    const auto type = text_type();
+    read(type, data.data());
+    std::vector<std::string> texts;
+    for (const char* text : data) texts.emplace_back(text ? text : "");
+    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
+    return texts;
+}
 
 }  // namespace
 
@@ -113,23 +138,12 @@ void put_attribute(hid_t object, const std::string& name, hid_t type, hid_t exte
     const bool empty = H5Sget_simple_extent_npoints(extent) == 0;
     require(empty || H5Awrite(attribute, type, data) >= 0, "write attribute", name);
 }
-void put_attribute(hid_t object, const std::string& name, double value) {
-    put_attribute(object, name, H5T_NATIVE_DOUBLE, scalar(), &value);
-}
-void put_attribute(hid_t object, const std::string& name, std::int64_t value) {
-    put_attribute(object, name, H5T_NATIVE_INT64, scalar(), &value);
-}
-void put_attribute(hid_t object, const std::string& name, std::uint64_t value) {
-    put_attribute(object, name, H5T_NATIVE_UINT64, scalar(), &value);
-}
 void put_attribute(hid_t object, const std::string& name, const std::string& text) {
     const char* data = text.c_str();
     put_attribute(object, name, text_type(), scalar(), &data);
 }
 void put_attribute(hid_t object, const std::string& name, const std::vector<std::string>& texts) {
-    std::vector<const char*> data;
-    for (const std::string& text : texts) data.push_back(text.c_str());
-    put_attribute(object, name, text_type(), space({texts.size()}), data.data());
+    put_attribute(object, name, text_type(), space({texts.size()}), pointers_to(texts).data());
 }
 
 Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data) {
@@ -142,8 +156,14 @@ Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t exte
     return dataset;
 }
 
-Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values) {
-    return put_dataset(parent, name, H5T_NATIVE_INT64, space({values.size()}), values.data());
+Handle put_dataset(hid_t parent, const std::string& name, const std::string& text) {
+    const char* data = text.c_str();
+    return put_dataset(parent, name, text_type(), scalar(), &data);
+}
+
+Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::string>& texts,
+                   const std::vector<std::size_t>& shape) {
+    return put_dataset(parent, name, text_type(), space(shape), pointers_to(texts).data());
 }
 
 Handle make_group(hid_t parent, const std::string& name) {
@@ -211,7 +231,7 @@ void require_all_values(hid_t file) {
 // Results of version 0.1 have none.
 void require_schema(hid_t file) {
     if (H5Aexists(file, "schema") <= 0) return;
-    const auto found = get_attribute<std::int64_t>(open_attribute(file, "schema"), H5T_NATIVE_INT64, "schema");
+    const auto found = get_number<std::int64_t>(file, "schema");
     if (found > schema)
         throw std::runtime_error(fmt::format(
             "was written by a later version of tubule, with schema {}; this version reads 1 to {}", found, schema));
@@ -256,63 +276,60 @@ Handle open_group(hid_t parent, const std::string& name) {
     return {H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, "open", name};
 }
 
-Handle open_attribute(hid_t object, const std::string& name) {
-    return {H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, "open attribute", name};
-}
+namespace {
 
-std::vector<std::string> get_texts(hid_t attribute, std::string_view name) {
-    const Handle extent(H5Aget_space(attribute), H5Sclose, "read attribute", name);
-    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
-    if (data.empty()) return {};
-    const auto type = text_type();
-    require(H5Aread(attribute, type, data.data()) >= 0, "read attribute", name);
-    std::vector<std::string> texts;
-    for (const char* text : data) texts.emplace_back(text ? text : "");
-    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
-    return texts;
-}
-
-Value get_value(hid_t attribute, std::string_view name) {
-    const Handle type(H5Aget_type(attribute), H5Tclose, "read attribute", name);
-    switch (H5Tget_class(type)) {
-        case H5T_INTEGER:
-            return get_attribute<std::int64_t>(attribute, H5T_NATIVE_INT64, name);
-        case H5T_FLOAT:
-            return get_attribute<double>(attribute, H5T_NATIVE_DOUBLE, name);
-        default:
-            break;
+// An attribute to read, and its extent.
+struct Attribute {
+    Handle attribute, extent;
+    Attribute(hid_t object, const std::string& name)
+        : attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, "open attribute", name),
+          extent(H5Aget_space(attribute), H5Sclose, "read attribute", name) {}
+    void read(hid_t type, void* into, const std::string& name) const {
+        require(H5Aread(attribute, type, into) >= 0, "read attribute", name);
     }
-    const auto texts = get_texts(attribute, name);
+};
+
+}  // namespace
+
+void read_number(hid_t object, const std::string& name, hid_t type, void* into) {
+    const Attribute opened(object, name);
+    require(H5Sget_simple_extent_npoints(opened.extent) == 1, "read as one value attribute", name);
+    opened.read(type, into, name);
+}
+
+std::vector<std::string> get_texts(hid_t object, const std::string& name) {
+    const Attribute opened(object, name);
+    return texts_of(opened.extent, [&](hid_t type, void* into) { opened.read(type, into, name); });
+}
+
+std::string get_text(hid_t object, const std::string& name) {
+    const std::vector<std::string> texts = get_texts(object, name);
     require(texts.size() == 1, "read as one value attribute", name);
     return texts.front();
+}
+
+Value get_value(hid_t object, const std::string& name) {
+    const Handle type(H5Aget_type(Attribute(object, name).attribute), H5Tclose, "read attribute", name);
+    switch (H5Tget_class(type)) {
+        case H5T_INTEGER:
+            return get_number<std::int64_t>(object, name);
+        case H5T_FLOAT:
+            return get_number<double>(object, name);
+        default:
+            return get_text(object, name);
+    }
 }
 
 std::vector<std::string> attribute_names(hid_t group) {
     H5O_info_t info;
     require(H5Oget_info2(group, &info, H5O_INFO_NUM_ATTRS) >= 0, "read", "a group");
-    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
-    unsigned order = 0;
-    H5Pget_attr_creation_order(how, &order);
-    std::vector<std::string> names;
-    for (hsize_t i = 0; i < info.num_attrs; ++i)
-        names.push_back(name_of([&](char* into, std::size_t n) {
-            return H5Aget_name_by_idx(group, ".", index_of(order), H5_ITER_INC, i, into, n, H5P_DEFAULT);
-        }));
-    return names;
+    return names_in_order(group, info.num_attrs, H5Pget_attr_creation_order, H5Aget_name_by_idx);
 }
 
 std::vector<std::string> member_names(hid_t group) {
     H5G_info_t info;
     require(H5Gget_info(group, &info) >= 0, "read", "a group");
-    const Handle how(H5Gget_create_plist(group), H5Pclose, "read", "properties of a group");
-    unsigned order = 0;
-    H5Pget_link_creation_order(how, &order);
-    std::vector<std::string> names;
-    for (hsize_t i = 0; i < info.nlinks; ++i)
-        names.push_back(name_of([&](char* into, std::size_t n) {
-            return H5Lget_name_by_idx(group, ".", index_of(order), H5_ITER_INC, i, into, n, H5P_DEFAULT);
-        }));
-    return names;
+    return names_in_order(group, info.nlinks, H5Pget_link_creation_order, H5Lget_name_by_idx);
 }
 
 Array get_array(hid_t parent, const std::string& name) {
@@ -331,6 +348,17 @@ std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name) {
     return values;
 }
 
+std::vector<std::string> get_text_array(hid_t parent, const std::string& name) {
+    const Opened opened(parent, name);
+    return texts_of(opened.extent, [&](hid_t type, void* into) { opened.read(type, into, name); });
+}
+
+std::string get_text_dataset(hid_t parent, const std::string& name) {
+    const std::vector<std::string> texts = get_text_array(parent, name);
+    require(texts.size() == 1, "read as one string", name);
+    return texts.front();
+}
+
 CaseInputs get_inputs(hid_t file) {
     if (!has(file, "inputs")) return {};
     const auto group = open_group(file, "inputs");
@@ -340,9 +368,9 @@ CaseInputs get_inputs(hid_t file) {
         CaseInput input;
         input.bytes.resize(opened.size());
         opened.read(H5T_NATIVE_UINT8, input.bytes.data(), name);
-        input.name = get_texts(open_attribute(opened.dataset, "name"), "name").at(0);
-        input.size = get_attribute<std::uint64_t>(open_attribute(opened.dataset, "size"), H5T_NATIVE_UINT64, "size");
-        input.crc = get_attribute<std::uint32_t>(open_attribute(opened.dataset, "crc32"), H5T_NATIVE_UINT32, "crc32");
+        input.name = get_text(opened.dataset, "name");
+        input.size = get_number<std::uint64_t>(opened.dataset, "size");
+        input.crc = static_cast<std::uint32_t>(get_number<std::uint64_t>(opened.dataset, "crc32"));
         out.push_back(std::make_shared<const CaseInput>(std::move(input)));
     }
     return out;

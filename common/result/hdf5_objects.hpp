@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -58,6 +57,23 @@ Handle text_type();
 Handle scalar();
 Handle space(const std::vector<std::size_t>& shape);
 
+// The type of a number in memory.
+inline hid_t native(double) {
+    return H5T_NATIVE_DOUBLE;
+}
+inline hid_t native(std::int64_t) {
+    return H5T_NATIVE_INT64;
+}
+inline hid_t native(std::uint64_t) {
+    return H5T_NATIVE_UINT64;
+}
+inline hid_t native(std::int8_t) {
+    return H5T_NATIVE_INT8;
+}
+inline hid_t native(std::uint8_t) {
+    return H5T_NATIVE_UINT8;
+}
+
 // ---- writing
 
 // Which layout a file has, as an attribute: raised when a program that reads the former one would misread it.
@@ -68,14 +84,27 @@ Handle make_image(std::size_t step);
 std::vector<std::byte> bytes_of(hid_t image);
 
 void put_attribute(hid_t object, const std::string& name, hid_t type, hid_t extent, const void* data);
-void put_attribute(hid_t object, const std::string& name, double value);
-void put_attribute(hid_t object, const std::string& name, std::int64_t value);
-void put_attribute(hid_t object, const std::string& name, std::uint64_t value);
+template <class Number>
+void put_attribute(hid_t object, const std::string& name, Number value) {
+    put_attribute(object, name, native(value), scalar(), &value);
+}
 void put_attribute(hid_t object, const std::string& name, const std::string& text);
 void put_attribute(hid_t object, const std::string& name, const std::vector<std::string>& texts);
 
 Handle put_dataset(hid_t parent, const std::string& name, hid_t type, hid_t extent, const void* data);
-Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values);
+Handle put_dataset(hid_t parent, const std::string& name, const std::string& text);
+Handle put_dataset(hid_t parent, const std::string& name, const std::vector<std::string>& texts,
+                   const std::vector<std::size_t>& shape);
+template <class Number>
+Handle put_dataset(hid_t parent, const std::string& name, const std::vector<Number>& values,
+                   const std::vector<std::size_t>& shape) {
+    return put_dataset(parent, name, native(Number{}), space(shape), values.data());
+}
+// A list.
+template <class T>
+Handle put_dataset(hid_t parent, const std::string& name, const std::vector<T>& values) {
+    return put_dataset(parent, name, values, {values.size()});
+}
 
 // A group that remembers the order in which its attributes and members were made.
 Handle make_group(hid_t parent, const std::string& name);
@@ -91,19 +120,18 @@ Handle open_file(const std::filesystem::path& file);
 
 bool has(hid_t parent, const std::string& name);
 Handle open_group(hid_t parent, const std::string& name);
-Handle open_attribute(hid_t object, const std::string& name);
 
-template <class T>
-T get_attribute(hid_t attribute, hid_t type, std::string_view name) {
-    const Handle extent(H5Aget_space(attribute), H5Sclose, "read attribute", name);
-    require(H5Sget_simple_extent_npoints(extent) == 1, "read as one value attribute", name);
-    T value{};
-    require(H5Aread(attribute, type, &value) >= 0, "read attribute", name);
+// Attributes.
+void read_number(hid_t object, const std::string& name, hid_t type, void* into);
+template <class Number>
+Number get_number(hid_t object, const std::string& name) {
+    Number value{};
+    read_number(object, name, native(value), &value);
     return value;
 }
-
-std::vector<std::string> get_texts(hid_t attribute, std::string_view name);
-Value get_value(hid_t attribute, std::string_view name);
+std::vector<std::string> get_texts(hid_t object, const std::string& name);
+std::string get_text(hid_t object, const std::string& name);
+Value get_value(hid_t object, const std::string& name);
 
 // In the order of writing, where the group knows it (a copy made by another program may not).
 std::vector<std::string> attribute_names(hid_t group);
@@ -111,6 +139,8 @@ std::vector<std::string> member_names(hid_t group);
 
 Array get_array(hid_t parent, const std::string& name);
 std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name);
+std::vector<std::string> get_text_array(hid_t parent, const std::string& name);
+std::string get_text_dataset(hid_t parent, const std::string& name);  // of one
 CaseInputs get_inputs(hid_t file);
 
 }  // namespace tubule::h5

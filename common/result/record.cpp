@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "common/result/contents.hpp"
+#include "common/result/hdf5_file.hpp"
 
 namespace tubule {
 

@@ -8,11 +8,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "common/result/contents.hpp"
+#include "common/result/about.hpp"
 #include "common/result/file_writer.hpp"
 #include "common/result/hdf5_file.hpp"
 #include "common/result/record.hpp"
-#include "common/result/view.hpp"
 #include "common/result/vtk_grid.hpp"
 
 namespace tubule {
@@ -142,18 +141,11 @@ Record rewind(Contents& contents) {
     if (!newest) throw std::runtime_error("it contains no frame or checkpoint to resume from");
     Record record = *newest;
 
-    const std::size_t width = contents.series.size();
-    const auto time = static_cast<std::size_t>(std::find(contents.series.begin(), contents.series.end(), "time") -
-                                               contents.series.begin());
-    if (time == width) throw std::runtime_error("/series/time is missing");
-    std::size_t kept = 0;  // values
-    for (std::size_t i = 0; i < contents.rows.size(); i += width) {
-        if (contents.rows[i + time] > record.time) continue;
-        std::copy_n(contents.rows.begin() + static_cast<std::ptrdiff_t>(i), width,
-                    contents.rows.begin() + static_cast<std::ptrdiff_t>(kept));
-        kept += width;
+    const std::vector<double> times = contents.series.at("time");
+    for (auto& [name, column] : contents.series) {
+        std::size_t i = 0;
+        std::erase_if(column, [&](double) { return times[i++] > record.time; });
     }
-    contents.rows.resize(kept);
     std::erase_if(contents.frames, [&](const Record& frame) { return frame.time > record.time; });
     // From the end only, so that the numbers of the others do not change.
     std::size_t needed = record.mesh ? *record.mesh + 1 : 0;
@@ -256,7 +248,8 @@ ResultWriter ResultWriter::create(const fs::path& file, const CaseText& c, const
     impl->contents.about_begun = about.size();
     impl->contents.case_text = c;
     impl->contents.about = about;
-    impl->contents.series = series;
+    impl->contents.series_names = series;
+    for (const std::string& name : series) impl->contents.series[name];
     return ResultWriter(std::move(impl));
 }
 
@@ -288,15 +281,14 @@ const Record& ResultWriter::restart_record() const {
 }
 
 void ResultWriter::row(std::span<const double> values) {
-    Contents& contents = impl_->contents;
-    if (values.size() != contents.series.size())
+    const std::vector<std::string>& series = impl_->contents.series_names;
+    if (values.size() != series.size())
         throw std::invalid_argument(
-            fmt::format("a row has {} values, but there are {} series", values.size(), contents.series.size()));
-    for (std::size_t j = 0; j < values.size(); ++j)
-        if (!std::isfinite(values[j])) check_finite(values[j], "series", contents.series[j]);
+            fmt::format("a row has {} values, but there are {} series", values.size(), series.size()));
+    for (std::size_t j = 0; j < values.size(); ++j) check_finite(values[j], "series", series[j]);
 
     impl_->refuse_if_finished();
-    contents.add_row(values);
+    impl_->contents.add_row(values);
     impl_->added(true, false);
 }
 
@@ -338,14 +330,7 @@ void ResultWriter::discard() {
 void ResultWriter::finish(const About& more) {
     check_about(more);
     impl_->refuse_if_finished();
-    About& about = impl_->contents.about;
-    for (const auto& [name, value] : more) {
-        const auto same = std::find_if(about.begin(), about.end(), [&](const auto& old) { return old.first == name; });
-        if (same != about.end())
-            same->second = value;
-        else
-            about.emplace_back(name, value);
-    }
+    update(impl_->contents.about, more);
     impl_->contents.segments.clear();  // one file again
     impl_->has_other_segments = true;
     impl_->write_file();
@@ -362,21 +347,7 @@ bool is_point_data(const Array& array, const SurfaceCells& mesh) {
 
 Result read_result(const fs::path& file) {
     warn_of_old_journal(file);
-    Contents contents = read_hdf5(file);
-    Result result;
-    const std::size_t width = contents.series.size();
-    for (std::size_t j = 0; j < width; ++j) {
-        auto& column = result.series[contents.series[j]];
-        column.reserve(contents.rows.size() / width);
-        for (std::size_t i = j; i < contents.rows.size(); i += width) column.push_back(contents.rows[i]);
-    }
-    result.case_text = std::move(contents.case_text);
-    result.about = std::move(contents.about);
-    result.series_names = std::move(contents.series);
-    result.meshes = std::move(contents.meshes);
-    result.frames = std::move(contents.frames);
-    result.checkpoint = std::move(contents.checkpoint);
-    return result;
+    return read_hdf5(file);
 }
 
 CaseText read_case_text(const fs::path& file) {

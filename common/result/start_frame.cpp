@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
 #include "common/result/checksums.hpp"
 #include "common/result/frame_profile.hpp"
-#include "common/result/record_bytes.hpp"
+#include "common/result/hdf5_file.hpp"
 
 namespace tubule {
 namespace {
@@ -43,19 +47,90 @@ StartFrame read_frame(const Case& c, const ResultFrame& from) {
     return without_restart(std::move(result.frames[number]), result.meshes);
 }
 
-std::string to_bytes(const StartFrame& frame) {
-    Bytes out;
-    put(out, frame.record);
-    if (frame.cells) put(out, *frame.cells);
-    return {reinterpret_cast<const char*>(out.data()), out.size()};
+// ---- a frame as bytes, in the byte order of the machine (little-endian): written and read by one list of fields
+
+struct ToBytes {
+    std::string bytes;
+    bool more() const { return true; }
+    void raw(const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
+    template <class List>
+    void resize(List&, std::uint64_t) const {}
+};
+
+struct FromBytes {
+    std::string_view rest;
+    bool more() const { return !rest.empty(); }
+    void raw(void* data, std::size_t size) {
+        require(size);
+        std::memcpy(data, rest.data(), size);
+        rest.remove_prefix(size);
+    }
+    template <class List>
+    void resize(List& list, std::uint64_t size) const {
+        require(size);  // each entry has a byte at least
+        list.resize(size);
+    }
+    // Its checksum has been found right: running over the end is a fault of the program that wrote it.
+    void require(std::uint64_t size) const {
+        if (size > rest.size()) throw std::runtime_error("a record is shorter than its stated length");
+    }
+};
+
+template <class Bytes, class List, class Entry>
+void put_list(Bytes& b, List& list, const Entry& entry) {
+    std::uint64_t size = list.size();
+    b.raw(&size, sizeof size);
+    b.resize(list, size);
+    for (auto& one : list) entry(one);
+}
+template <class Bytes, class List>
+void put_values(Bytes& b, List& list) {  // of numbers or characters
+    put_list(b, list, [&](auto& one) { b.raw(&one, sizeof one); });
+}
+
+template <class Bytes>
+void put_fields(Bytes& b, StartFrame& frame) {
+    constexpr std::uint64_t no_mesh = ~std::uint64_t{0};
+    Record& record = frame.record;
+    b.raw(&record.time, sizeof record.time);
+    put_list(b, record.numbers, [&](auto& number) {
+        put_values(b, number.first);
+        b.raw(&number.second, sizeof number.second);
+    });
+    put_list(b, record.arrays, [&](Array& array) {
+        put_values(b, array.name);
+        put_values(b, array.shape);
+        put_values(b, array.data);
+    });
+    std::uint64_t mesh = record.mesh.value_or(no_mesh);
+    if (b.more()) b.raw(&mesh, sizeof mesh);
+    if (mesh != no_mesh) record.mesh = mesh;
+    std::string kind(record.kind ? name(*record.kind) : "");
+    if (b.more()) put_values(b, kind);
+    if (!kind.empty()) record.kind = record_kind(kind);
+    if (mesh == no_mesh || !b.more()) return;
+    SurfaceCells& cells = frame.cells ? *frame.cells : frame.cells.emplace();
+    std::uint64_t order = cells.order, nodes = cells.nodes;
+    b.raw(&order, sizeof order), b.raw(&nodes, sizeof nodes), b.raw(&cells.period, sizeof cells.period);
+    cells.order = static_cast<int>(order), cells.nodes = nodes;
+    put_values(b, cells.cells);
+    put_values(b, cells.shifts);
+}
+
+std::string to_bytes(StartFrame frame) {
+    ToBytes out;
+    put_fields(out, frame);
+    return std::move(out.bytes);
 }
 
 StartFrame from_bytes(const std::string& bytes) {
-    Payload in(std::as_bytes(std::span(bytes)));
-    StartFrame out{get_record(in), {}};
-    if (!in.empty()) out.cells = get_mesh(in);
+    FromBytes in{bytes};
+    StartFrame out;
+    put_fields(in, out);
     return out;
 }
+
+// ----
 
 // Whether there is a file where the shape comes from, readable or not.
 bool has_file(const Case& c) {

@@ -1,4 +1,3 @@
-#include "common/result/view.hpp"
 
 #include <fmt/format.h>
 
@@ -32,10 +31,7 @@ void write(const fs::path& file, std::span<const std::byte> bytes) {
 
 std::string quoted(const std::string& text) {
     std::string out = "\"";
-    for (const char c : text) {
-        if (c == '"' || c == '\\') out += '\\';
-        out += c;
-    }
+    for (const char c : text) out += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
     return out + '"';
 }
 

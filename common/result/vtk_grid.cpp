@@ -37,11 +37,6 @@ void put_format(hid_t group, std::array<std::int64_t, 2> version) {
     put_attribute(group, "Type", fixed, scalar(), type.data());
 }
 
-Handle put_doubles(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
-                   const std::vector<double>& data) {
-    return put_dataset(parent, name, H5T_NATIVE_DOUBLE, space(shape), data.data());
-}
-
 // Rows of nodes become rows of points, and back.
 Array at_points(const Array& array, const VtkPoints& points) {
     Array out{array.name, array.shape, array.data};
@@ -107,15 +102,14 @@ std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>&
         put_attribute(group, "order", std::int64_t{mesh.order});
         put_attribute(group, "nodes", static_cast<std::int64_t>(mesh.nodes));
         put_attribute(group, "period", mesh.period);
-        put_dataset(group, "NumberOfPoints", {static_cast<std::int64_t>(points.node.size())});
-        put_dataset(group, "NumberOfCells", {static_cast<std::int64_t>(cells)});
-        put_dataset(group, "NumberOfConnectivityIds", {static_cast<std::int64_t>(mesh.cells.size())});
+        put_dataset(group, "NumberOfPoints", std::vector{static_cast<std::int64_t>(points.node.size())});
+        put_dataset(group, "NumberOfCells", std::vector{static_cast<std::int64_t>(cells)});
+        put_dataset(group, "NumberOfConnectivityIds", std::vector{static_cast<std::int64_t>(mesh.cells.size())});
         put_dataset(group, "Connectivity", points.connectivity);
         std::vector<std::int64_t> offsets;
         for (std::size_t c = 0; c <= cells; ++c) offsets.push_back(static_cast<std::int64_t>(c * nodes_per_cell(mesh)));
         put_dataset(group, "Offsets", offsets);
-        const std::vector<std::uint8_t> types(cells, lagrange_triangle);
-        put_dataset(group, "Types", H5T_NATIVE_UINT8, space({cells}), types.data());
+        put_dataset(group, "Types", std::vector<std::uint8_t>(cells, lagrange_triangle));
         if (mesh.period > 0) {
             put_dataset(group, "point_node", points.node);
             put_dataset(group, "point_shift", points.shift);
@@ -127,13 +121,10 @@ std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>&
 
 SurfaceCells get_mesh(hid_t meshes, const std::string& name) {
     const auto group = open_group(meshes, name);
-    const auto integer = [&](const char* key) {
-        return get_attribute<std::int64_t>(open_attribute(group, key), H5T_NATIVE_INT64, key);
-    };
     SurfaceCells mesh;
-    mesh.order = static_cast<int>(integer("order"));
-    mesh.nodes = static_cast<std::size_t>(integer("nodes"));
-    mesh.period = get_attribute<double>(open_attribute(group, "period"), H5T_NATIVE_DOUBLE, "period");
+    mesh.order = static_cast<int>(get_number<std::int64_t>(group, "order"));
+    mesh.nodes = static_cast<std::size_t>(get_number<std::int64_t>(group, "nodes"));
+    mesh.period = get_number<double>(group, "period");
     if (mesh.order < 1 || mesh.order > 4)
         throw std::runtime_error(fmt::format("mesh {}: its order is {}, not 1 to 4", name, mesh.order));
     const bool tube = mesh.period > 0;
@@ -166,11 +157,11 @@ void put_grid(hid_t group, const Record& record, const WrittenMesh& written) {
     const auto put_one = [&](const Array& array) {
         if (array.name == "points") {
             const Array points = points_of(array, written);
-            return put_doubles(group, "Points", points.shape, points.data);
+            return put_dataset(group, "Points", points.data, points.shape);
         }
-        if (!is_point_data(array, written.mesh)) return put_doubles(group, array.name, array.shape, array.data);
+        if (!is_point_data(array, written.mesh)) return put_dataset(group, array.name, array.data, array.shape);
         const Array values = at_points(array, written.points);
-        return put_doubles(data, values.name, values.shape, values.data);
+        return put_dataset(data, values.name, values.data, values.shape);
     };
     // The numbers of the nodes come first, whatever points follow.
     for (const Array& array : record.arrays) put_one(array);
@@ -179,7 +170,7 @@ void put_grid(hid_t group, const Record& record, const WrittenMesh& written) {
 std::vector<Array> get_grid_arrays(hid_t group, const SurfaceCells& mesh) {
     std::vector<Array> arrays;
     const auto data = open_group(group, "PointData");
-    for (const std::string& name : get_texts(open_attribute(group, "arrays"), "arrays")) {
+    for (const std::string& name : get_texts(group, "arrays")) {
         if (name == "points")
             arrays.push_back(at_nodes(get_array(group, "Points"), name, mesh.nodes));
         else if (has(data, name))
@@ -275,10 +266,6 @@ void put_numbers(hid_t group, const std::vector<WrittenMesh>& meshes) {
     put_virtual(group, "Types", H5T_NATIVE_UINT8, 0, types);
 }
 
-void put_column(hid_t parent, const std::string& name, const std::vector<std::int64_t>& values) {
-    put_dataset(parent, name, H5T_NATIVE_INT64, space({values.size(), 1}), values.data());
-}
-
 }  // namespace
 
 void put_steps(hid_t file, const Contents& contents, const std::vector<WrittenMesh>& meshes) {
@@ -322,12 +309,12 @@ void put_steps(hid_t file, const Contents& contents, const std::vector<WrittenMe
     }
     const auto listing = make_group(group, "Steps");
     put_attribute(listing, "NSteps", static_cast<std::int64_t>(steps.size()));
-    put_doubles(listing, "Values", {times.size()}, times);
+    put_dataset(listing, "Values", times);
     put_dataset(listing, "NumberOfParts", std::vector<std::int64_t>(steps.size(), 1));
     put_dataset(listing, "PartOffsets", part);
     put_dataset(listing, "PointOffsets", first_point);
-    put_column(listing, "CellOffsets", first_cell);
-    put_column(listing, "ConnectivityIdOffsets", first_id);
+    put_dataset(listing, "CellOffsets", first_cell, {steps.size(), 1});
+    put_dataset(listing, "ConnectivityIdOffsets", first_id, {steps.size(), 1});
     const auto offsets = make_group(listing, "PointDataOffsets");
     for (const auto& [name, width] : common) put_dataset(offsets, name, first_point);
 }

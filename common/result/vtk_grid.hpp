@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/result/contents.hpp"
+#include "common/result/hdf5_file.hpp"
 
 namespace tubule {
 

@@ -15,8 +15,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
 #include "tests/support/message_of.hpp"
-#include "tools/compare/revolution_surface.hpp"
-#include "tools/compare/triangle_surface.hpp"
+#include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare::distance_test {
 

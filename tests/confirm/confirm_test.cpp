@@ -1,4 +1,6 @@
 // Which points are run in three dimensions, from which starts, and what their results are taken to say.
+#include "tools/confirm/confirm.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,9 +11,6 @@
 #include "common/geometry/profile_point.hpp"
 #include "surface3d/run/mesh_record.hpp"
 #include "surface3d/run/start.hpp"
-#include "tools/confirm/equilibrium_pair.hpp"
-#include "tools/confirm/picks.hpp"
-#include "tools/confirm/surface_point.hpp"
 
 namespace tubule::confirm::confirm_test {
 

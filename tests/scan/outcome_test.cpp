@@ -8,12 +8,11 @@
 #include <random>
 
 #include "common/case/read.hpp"
+#include "common/solve/interrupt.hpp"
 #include "tools/scan/point.hpp"
 #include "tools/scan/uniform_fate.hpp"
 
 namespace tubule::outcome_test {
-
-const auto never = [] { return false; };
 
 Case tube(double k42, double H0, double length, double amplitude, double end = 2000) {
     Case c = parse_case(
@@ -55,12 +54,12 @@ TEST(Outcome, OfStopAndShape) {
 // Known outcomes: cases/nearly_pinched, just_pinched (critical amplitude .38103 to .38104 for these moduli); Delaunay's
 // unduloids of period 4/|H0| to 2 pi/|H0|; the principal symbol of cases/ill_posed_start; cases/overhang.
 TEST(Outcome, OfRuns) {
-    EXPECT_EQ(run_point(tube(0, -2, 2, 0.380), false, never).outcome, Outcome::uniform_tube);
-    EXPECT_EQ(run_point(tube(0, -2, 2, 0.382), false, never).outcome, Outcome::pinched);
-    EXPECT_EQ(run_point(tube(0, -1, 5.5, 0.4), false, never).outcome, Outcome::unduloid);
-    EXPECT_EQ(run_point(tube(-0.3, -1, 2, 0.1), false, never).outcome, Outcome::ill_posed);
-    EXPECT_EQ(run_point(tube(0, 0, 1, 0.45), false, never).outcome, Outcome::overhang);
-    EXPECT_EQ(run_point(tube(0, -2, 2, 0.2, 0.01), false, never).outcome, Outcome::undecided);
+    EXPECT_EQ(run_point(tube(0, -2, 2, 0.380), false).outcome, Outcome::uniform_tube);
+    EXPECT_EQ(run_point(tube(0, -2, 2, 0.382), false).outcome, Outcome::pinched);
+    EXPECT_EQ(run_point(tube(0, -1, 5.5, 0.4), false).outcome, Outcome::unduloid);
+    EXPECT_EQ(run_point(tube(-0.3, -1, 2, 0.1), false).outcome, Outcome::ill_posed);
+    EXPECT_EQ(run_point(tube(0, 0, 1, 0.45), false).outcome, Outcome::overhang);
+    EXPECT_EQ(run_point(tube(0, -2, 2, 0.2, 0.01), false).outcome, Outcome::undecided);
 }
 
 // A tube that is unstable, with so small a wave that nothing seems to move: H0 = 0 is stable, but at rest H0 = -1 with
@@ -68,18 +67,21 @@ TEST(Outcome, OfRuns) {
 // call it uniform; the energy falls in a direction, so that the run goes on.
 TEST(Outcome, ASaddleIsNoRest) {
     const Case c = tube(-0.05, -1, 2 * std::numbers::pi, 1e-5, 1e4);
-    const PointResult p = run_point(c, false, never);
+    const PointResult p = run_point(c, false);
     EXPECT_NE(p.outcome, Outcome::uniform_tube) << p.message;
 }
 
 // Two waves of period 3.25 with |H0| = 2 hardly move, for q R is near 1; but Delaunay's unduloids end at the period
 // 2 pi/|H0| = 3.14, so this is none, and time.stationary alone would call it one.
 TEST(Outcome, ASlowWaveIsNoUnduloid) {
-    EXPECT_EQ(run_point(tube(0, -2, 6.5, 0.3, 200), false, never).outcome, Outcome::uniform_tube);
+    EXPECT_EQ(run_point(tube(0, -2, 6.5, 0.3, 200), false).outcome, Outcome::uniform_tube);
 }
 
 TEST(Outcome, InterruptedPointsSaySo) {
-    EXPECT_EQ(run_point(tube(0, -2, 2, 0.2), false, [] { return true; }).stop, stop_word(Stop::interrupted));
+    set_interrupted(true);
+    const PointResult p = run_point(tube(0, -2, 2, 0.2), false);
+    set_interrupted(false);
+    EXPECT_EQ(p.stop, stop_word(Stop::interrupted));
 }
 
 // Where it does not apply it must not be used: other models, a volume that is kept, closed cells.
@@ -130,10 +132,10 @@ void compare_random_points(int count, unsigned seed) {
         const double k42 = random() % 2 ? 0 : in(-0.05, 0.1), H0 = in(-2.5, 0.5), length = in(1.5, 9),
                      amplitude = in(0, 0.5);
         const Case c = tube(k42, H0, length, amplitude, 1000);
-        const PointResult early = run_point(c, false, never);
+        const PointResult early = run_point(c, false);
         if (stop_words()[static_cast<std::size_t>(early.stop)] != "decided") continue;
         ++decided;
-        const PointResult end = run_point(c, true, never);
+        const PointResult end = run_point(c, true);
         const double waves = (end[Measure::r_max] - end[Measure::r_min]) / (end[Measure::r_max] + end[Measure::r_min]);
         const bool uniform =
             end.outcome == Outcome::uniform_tube || (end.outcome == Outcome::undecided && waves < 0.01);

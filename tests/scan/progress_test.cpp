@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/screen.hpp"
-#include "tools/scan/scan_progress.hpp"
+#include "tools/scan/dispatcher.hpp"
 
 namespace tubule::progress_test {
 

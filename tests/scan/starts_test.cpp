@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "common/case/read.hpp"
 #include "tests/support/message_of.hpp"
-#include "tools/scan/rank_scan.hpp"
-#include "tools/scan/scan_plan.hpp"
+#include "tools/scan/dispatcher.hpp"
 
 namespace tubule::starts_test {
 
@@ -131,12 +131,12 @@ TEST(Starts, ACrossingIsFound) {
     for (std::size_t i = 0; i < scan.size(); ++i) points.push_back(run_one(scan, {i, {}}));
     const auto crossings = energy_crossings(Nodes(scan), points, 0);
     ASSERT_EQ(crossings.size(), 1u);
-    const PointResult p = find_crossing(scan, crossings[0], [] { return false; });
+    const PointResult p = find_crossing(scan, crossings[0]);
     EXPECT_NEAR(p.value, 0.65108, 1e-5);
     // Where one of the starts leads to another kind, there is none, and it is said.
     EnergyCrossing other = crossings[0];
     other.kinds[1] = Outcome::stomatocyte;
-    const PointResult none = find_crossing(scan, other, [] { return false; });
+    const PointResult none = find_crossing(scan, other);
     EXPECT_EQ(none.outcome, Outcome::failed);
     EXPECT_EQ(none.message.find("there is no stomatocyte at equilibrium.reduced_volume = 0.6"), 0u) << none.message;
     EXPECT_TRUE(std::isnan(none.value));

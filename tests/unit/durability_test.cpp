@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include "common/result/contents.hpp"
 #include "common/result/durable_io.hpp"
 #include "common/result/file_writer.hpp"
+#include "common/result/hdf5_file.hpp"
 #include "common/result/result.hpp"
 #include "tests/support/message_of.hpp"
 

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/result/contents.hpp"
 #include "common/result/file_writer.hpp"
+#include "common/result/hdf5_file.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace tubule {

@@ -7,17 +7,152 @@
 #include <optional>
 #include <set>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "axisym/run.hpp"
+#include "common/case/keys.hpp"
+#include "common/case/problem.hpp"
+#include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"
+#include "surface3d/run/motion_start.hpp"
 #include "tools/auto/joined_file.hpp"
-#include "tools/auto/profile_watch.hpp"
+#include "tools/auto/noise_growth.hpp"
 #include "tools/auto/waves.hpp"
 
 namespace tubule {
 
 namespace {
+
+// ---- an axisymmetric run as it goes: noise grows along it, until it is too large
+
+constexpr double rough_rates = 0.1;  // error, relative
+
+// The numbers wave_1, wave_2, ... of a frame: amplitudes that noise has reached, relative to the largest radius.
+void set_amplitudes(Record& frame, const std::vector<double>& amplitudes) {
+    for (std::size_t i = 0; i < amplitudes.size(); ++i)
+        frame.numbers.emplace_back(fmt::format("wave_{}", i + 1), amplitudes[i]);
+}
+
+std::vector<double> amplitudes_of(const Record& frame) {
+    std::vector<double> out;
+    for (const auto& [name, value] : frame.numbers)
+        if (name == fmt::format("wave_{}", out.size() + 1)) out.push_back(value);
+    return out;
+}
+
+std::vector<double> amplitudes_at(const NoiseGrowth& growth, double time) {
+    std::vector<double> out;
+    for (int m = 1; m <= growth.modes(); ++m) out.push_back(growth.amplitude(m, time));
+    return out;
+}
+
+// How well the rates are known.
+struct RatesKnown {
+    int states = 0, unknown = 0, estimated = 0, rough = 0;
+    std::string why_unknown;  // the last time
+};
+
+class ProfileWatch : public TierPart {
+public:
+    // The case must outlive it. Frames at the times `only_for_rates` do not go to the file.
+    ProfileWatch(const Problem& c, RunObserver& file, RowMap map, std::set<double> only_for_rates);
+
+    // Resumes from a frame of the file, with the amplitudes stored there.
+    void resume(const Record& frame);
+
+    void frame(const std::function<Record()>& make) override;
+    void checkpoint(const Record& state) override;
+    void discard() override;
+    bool interrupted() override { return reached_ || TierPart::interrupted(); }
+
+    const NoiseGrowth& growth() const { return growth_; }
+    const RatesKnown& known() const { return known_; }
+    // When, and with which wave, the run must go on in three dimensions.
+    const std::optional<NoiseGrowth::Peak>& reached() const { return reached_; }
+    const std::optional<Record>& last_frame() const { return last_frame_; }
+
+private:
+    void look_at(const Record& frame);
+    std::vector<double> last_rates() const;
+    Record with_amplitudes(Record frame) const;
+
+    const Problem& case_;
+    std::set<double> only_for_rates_;
+    NoiseGrowth growth_;
+    RatesKnown known_;
+    double last_time_ = -1;
+    std::optional<NoiseGrowth::Peak> reached_;
+    std::optional<Record> last_frame_;
+};
+
+ProfileWatch::ProfileWatch(const Problem& c, RunObserver& file, RowMap map, std::set<double> only_for_rates)
+    : TierPart(file, std::move(map)),
+      case_(c),
+      only_for_rates_(std::move(only_for_rates)),
+      growth_(c.automatic.noise, c.automatic.modes) {}
+
+void ProfileWatch::resume(const Record& frame) {
+    growth_.begin_with(amplitudes_of(frame));
+    look_at(frame);
+}
+
+void ProfileWatch::look_at(const Record& frame) {
+    if (reached_ || frame.time <= last_time_) return;
+    last_time_ = frame.time;
+    ++known_.states;
+    std::vector<double> rates(growth_.modes(), 0.0);
+    try {
+        const WaveRates found = wave_rates(case_, frame);
+        rates = found.rates;
+        known_.estimated += found.estimated;
+        known_.rough += found.accuracy > rough_rates;
+    } catch (const std::exception& error) {
+        ++known_.unknown;
+        known_.why_unknown = error.what();
+        rates = last_rates();
+    } catch (const Paused&) {  // the run ends with its next step: until then
+        rates = last_rates();
+    }
+    growth_.add(frame.time, rates);
+    reached_ = growth_.reached(case_.automatic.largest);
+}
+
+std::vector<double> ProfileWatch::last_rates() const {
+    std::vector<double> rates(growth_.modes(), 0.0);
+    for (int m = 1; m <= growth_.modes() && !growth_.empty(); ++m) rates[m - 1] = growth_.last_rate(m);
+    return rates;
+}
+
+void ProfileWatch::frame(const std::function<Record()>& make) {
+    Record record = make();
+    look_at(record);
+    record = with_amplitudes(std::move(record));
+    if (!only_for_rates_.contains(record.time)) TierPart::frame([&] { return record; });
+    last_frame_ = std::move(record);
+}
+
+void ProfileWatch::checkpoint(const Record& state) {
+    look_at(state);
+    TierPart::checkpoint(with_amplitudes(state));
+}
+
+void ProfileWatch::discard() {
+    TierPart::discard();
+    growth_.forget();
+    known_ = {};
+    last_time_ = -1;
+    last_frame_.reset();
+}
+
+Record ProfileWatch::with_amplitudes(Record frame) const {
+    set_amplitudes(frame, amplitudes_at(growth_, frame.time));
+    return frame;
+}
+
+// ---- the run
 
 // Times at which rates are found, beside those of frames: so many equal parts of the run, and the first of them halved
 // so often, for what is quick at the start.
@@ -301,6 +436,38 @@ RunSummary run_auto(const Problem& c, const Choice& choice, RunObserver& file, c
     if (before.frames.empty() || !is_switch(before.frames.back()))
         throw std::runtime_error("the result has no frame at which its run switched to three dimensions");
     return run.after_switch(before.frames.back(), before, restart->record.mesh ? restart : nullptr);
+}
+namespace {
+
+// So few triangles are accurate to `few_reach` where they have the energy of the start to `few_start`: of the scenes of
+// docs/both_tiers and of tests/studies/command/advice_study.py those with 3e-4 and less are, while a neck with 1.3e-3
+// states no error and a rough fluid with 3e-3 is lost.
+constexpr double few_reach = 1e-2, few_start = 5e-4;
+
+}  // namespace
+
+bool few_triangles_do(const Problem& c, const surface3d::Start& start) {
+    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order || c.surface_resolution_given())
+        return false;
+    const surface3d::StartMesh mesh = start.mesh(surface3d::least_triangles, c.element_order);
+    const surface3d::Observables o = surface3d::observe_start(c, mesh);
+    const double energy = surface3d::free_energy(c, o, mesh.mesh.period);
+    return surface3d::error_of_start(c, start, surface3d::least_triangles, energy, false) <=
+           few_start * surface3d::reference_energy(c, o, mesh.mesh.period);
+}
+
+Choice choice_for(const Problem& c) {
+    if (const auto [key, complaint] = not_axisymmetric(c.shape); !key.empty())
+        return {false,
+                fmt::format("the initial shape is not axisymmetric: {} {}", key,
+                            std::holds_alternative<MeshFile>(c.shape) ? "is a mesh" : "breaks the symmetry"),
+                surface3d::Start(c.of_surface())};
+    if (std::holds_alternative<ResultFrame>(c.shape))
+        if (surface3d::Start start(c.of_surface()); !start.resizable())
+            return {false,
+                    "the initial shape is not axisymmetric: the frame of shape.path is a surface in three dimensions",
+                    std::move(start)};
+    return {true, "the initial shape and the model are axisymmetric", {}};
 }
 
 }  // namespace tubule

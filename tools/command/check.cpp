@@ -16,19 +16,13 @@
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/pause.hpp"
-#include "surface3d/run/motion_settings.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/installed.hpp"
-#include "tools/command/json.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/run/advice.hpp"
+#include "tools/run/case_checks.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
-#include "tools/run/ill_posed_start.hpp"
-#include "tools/run/model_advice.hpp"
-#include "tools/run/physics_notes.hpp"
 
 namespace tubule {
 

@@ -10,7 +10,8 @@
 #include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/run/run.hpp"
-#include "tools/run/model_advice.hpp"
+#include "tools/run/advice.hpp"
+#include "tools/scan/ranks.hpp"
 
 namespace CLI {
 class App;
@@ -53,5 +54,26 @@ void check_output(const std::filesystem::path& file);
 // And a file that must not be replaced: the result that the case starts from, or, unless `overwrite`, one of another
 // case.
 void check_replaced(const Problem& c, const std::filesystem::path& file, bool overwrite);
+
+// ---- across the processes of an mpirun
+
+// Runs `root` on rank 0, with the ranks or, if this process runs by itself, without; `serve` on the others. The exit
+// status. What `root` throws before it hands out work ends the others; CaseErrors go on to the caller.
+int run_ranked(const std::function<int(Ranks*)>& root, const std::function<void(Ranks&)>& serve);
+
+// For `root`, after an interrupt: ends the other ranks, whatever they are doing.
+[[noreturn]] void abort_interrupted(Ranks& ranks);
+
+// ---- comparisons
+
+// As the command line has them.
+struct CompareOptions {
+    std::vector<std::string> results, tolerances, frames, pictures;  // of `results`, the names
+    bool align = false, no_shapes = false, csv = false, json = false;
+};
+
+// Of results that are at hand, the answer as JSON, docs/schemas/compare.json. Throws std::invalid_argument for what
+// cannot be compared.
+std::string comparison_json(const CompareOptions& options, const Result& a, const Result& b);
 
 }  // namespace tubule

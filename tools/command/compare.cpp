@@ -1,6 +1,5 @@
 // tubule compare A B: two results of any tiers against each other, as a table, CSV, JSON and a picture; the exit status
 // says whether they agree within tolerances.
-#include "tools/command/compare.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,7 +9,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -19,11 +17,9 @@
 #include "common/case/text.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/python.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
 #include "tools/compare/results.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/scan/description.hpp"
@@ -37,11 +33,6 @@ using compare::SeriesDifference;
 using compare::ShapeDifference;
 
 constexpr int beyond_tolerance = 1, bad_input = 2;
-
-struct Tolerance {
-    std::string quantity;
-    double most;
-};
 
 // What is shown of one result, and what it must keep.
 struct Side {
@@ -80,8 +71,9 @@ struct Comparison {
 
 // ---- what is asked
 
-std::vector<Tolerance> tolerances_of(const CompareOptions& options) {
-    std::vector<Tolerance> out;
+// Each quantity with the most that it may be.
+std::vector<Quantity> tolerances_of(const CompareOptions& options) {
+    std::vector<Quantity> out;
     for (const std::string& text : options.tolerances) {
         const std::size_t equals = text.find('=');
         const auto most = equals == std::string::npos ? std::nullopt : number_of(text.substr(equals + 1));
@@ -162,13 +154,13 @@ std::vector<Quantity> quantities(const Comparison& c, bool with_shapes) {
     return out;
 }
 
-void require_known(const std::vector<Tolerance>& tolerances, const std::vector<Quantity>& known) {
+void require_known(const std::vector<Quantity>& tolerances, const std::vector<Quantity>& known) {
     std::vector<std::string> names;
     for (const Quantity& quantity : known) names.push_back(quantity.name);
-    for (const Tolerance& tolerance : tolerances) {
-        if (std::find(names.begin(), names.end(), tolerance.quantity) != names.end()) continue;
-        const auto meant = near_miss(tolerance.quantity, names);
-        refuse(fmt::format("--tolerance {}: not compared here{}; it must be one of {}", tolerance.quantity,
+    for (const auto& [name, most] : tolerances) {
+        if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+        const auto meant = near_miss(name, names);
+        refuse(fmt::format("--tolerance {}: not compared here{}; it must be one of {}", name,
                            meant ? fmt::format("; did you mean '{}'", *meant) : "", fmt::join(names, ", ")));
     }
 }
@@ -186,7 +178,7 @@ Side side_of(const std::string& name, const Result& result) {
 Comparison compared(const CompareOptions& options, const Result& a, const Result& b) {
     if (options.no_shapes && (options.align || !options.frames.empty()))
         refuse(fmt::format("{} compares shapes: --no-shapes must be absent", options.align ? "--align" : "--frames"));
-    const std::vector<Tolerance> tolerances = tolerances_of(options);
+    const std::vector<Quantity> tolerances = tolerances_of(options);
     Comparison out;
     out.a = side_of(options.results[0], a), out.b = side_of(options.results[1], b);
     out.aligned = options.align;
@@ -199,9 +191,9 @@ Comparison compared(const CompareOptions& options, const Result& a, const Result
     require_known(tolerances, quantities(out, !options.no_shapes));
     for (const FramePair& pair : pairs) out.shapes.push_back(compare::compare_shapes(a, b, pair, options.align));
     const std::vector<Quantity> known = quantities(out, !options.no_shapes);
-    for (const Tolerance& tolerance : tolerances)
+    for (const auto& [name, most] : tolerances)
         for (const Quantity& quantity : known)
-            if (quantity.name == tolerance.quantity) out.checks.push_back({quantity, tolerance.most});
+            if (quantity.name == name) out.checks.push_back({quantity, most});
     return out;
 }
 

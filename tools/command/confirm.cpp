@@ -1,5 +1,7 @@
 // tubule confirm SCAN: some points of a scan again in three dimensions, to see whether they say the same: motions from
 // shapes with waves, equilibria from those of tier axisym.
+#include "tools/confirm/confirm.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,7 +11,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -23,16 +24,9 @@
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/json.hpp"
-#include "tools/command/ranked.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/compare/results.hpp"
-#include "tools/confirm/equilibrium_pair.hpp"
-#include "tools/confirm/picks.hpp"
-#include "tools/confirm/surface_point.hpp"
-#include "tools/scan/packet.hpp"
 #include "tools/scan/scan_file.hpp"
 
 namespace tubule {
@@ -333,13 +327,12 @@ void prepare_equilibria(std::vector<ConfirmedPoint>& points, const fs::path& fol
 
 // A task: the number of a point and its run. A result: the number, and how the run ended.
 Packet run_task(const Packet& task) {
-    const auto words = unpacked(task);
-    const CaseEnd end = run_once({words[1], words[2]});
-    return packed({words[0], end.status, end.file});
+    const CaseEnd end = run_once({task[1], task[2]});
+    return {task[0], end.status, end.file};
 }
 
 // The runs of all points, in order, whoever asks for one.
-class SurfaceRuns : public RankTasks {
+class SurfaceRuns : public Tasks {
 public:
     SurfaceRuns(std::vector<ConfirmedPoint>& points, const fs::path& folder, bool quiet)
         : points_(points), folder_(folder), quiet_(quiet) {}
@@ -352,16 +345,15 @@ public:
         if (!quiet_)
             say(stderr, "{} of {}: point {}, {}\n", next_ + 1, points_.size(), p.pick.point, fmt::join(p.sets, ", "));
         const fs::path toml = folder_ / fmt::format("point_{:06}.toml", p.pick.point);
-        task = packed({next_, p.surface_case, toml.string()});
+        task = {next_, p.surface_case, toml.string()};
         ++next_;
         return NextTask::ready;
     }
     void give(const Packet& result) override {
         const std::lock_guard lock(mutex_);
-        const auto words = unpacked(result);
-        const int status = words[1];
+        const int status = result[1];
         if (status == exit_code(Stop::interrupted) || status == 2) status_ = status;
-        points_[words[0]].file = words[2];
+        points_[result[0]].file = result[2];
     }
     void fail(std::exception_ptr error) override {
         const std::lock_guard lock(mutex_);
@@ -386,11 +378,10 @@ private:
 };
 
 int run_all(SurfaceRuns& runs, Ranks* ranks) {
-    if (ranks) {
-        ranks->run(runs, packed("confirm"), run_task);
-    } else {
-        for (Packet task; runs.take(task, true) == NextTask::ready;) runs.give(run_task(task));
-    }
+    if (ranks)
+        ranks->run(runs, "confirm", run_task);
+    else
+        work_off(runs, run_task);
     const int status = runs.status();
     if (ranks && status == exit_code(Stop::interrupted)) abort_interrupted(*ranks);
     return status;

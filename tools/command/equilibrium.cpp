@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,10 +10,8 @@
 #include "common/result/result.hpp"
 #include "common/series/catalogue.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/installed.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/units.hpp"
 
 namespace tubule {

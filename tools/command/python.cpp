@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -13,12 +14,16 @@
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include "build_config.hpp"
+#include "common/result/result.hpp"
 #include "common/solve/message.hpp"
-#include "tools/command/installed.hpp"
+#include "tools/command/commands.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
+#include "tools/run/continuation.hpp"
+#include "tools/scan/scan_file.hpp"
 
 namespace tubule {
 
@@ -77,8 +82,8 @@ int wait_for(const std::string& subcommand, std::vector<std::string> command, st
     return WIFEXITED(status) ? WEXITSTATUS(status) : no_picture;
 }
 
-}  // namespace
-
+// The beginning of a command line that runs the script. Throws std::runtime_error in the name of the subcommand if
+// Python or the script are missing.
 std::vector<std::string> plot_command(const std::string& subcommand, const std::string& script) {
     if (access(python, X_OK) != 0)
         throw std::runtime_error(fmt::format(
@@ -90,6 +95,21 @@ std::vector<std::string> plot_command(const std::string& subcommand, const std::
             subcommand, script, folder.string()));
     return {python, "-B", folder, script};
 }
+
+// Python takes this process' place. Returns an exit status only if that is impossible.
+int become(const std::string& subcommand, std::vector<std::string> command) {
+    std::vector<char*> argv;
+    for (std::string& argument : command) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    std::fflush(nullptr);
+    setenv("TUBULE_PROGRAM", std::filesystem::read_symlink("/proc/self/exe").c_str(), 1);
+    const Withheld interrupts;
+    execv(argv[0], argv.data());
+    say(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));
+    return no_picture;
+}
+
+}  // namespace
 
 int draw_by_script(const std::string& subcommand, const std::string& script, const std::vector<std::string>& arguments,
                    const std::string& input) try {
@@ -115,16 +135,51 @@ std::string described_by_script(const std::string& subcommand) {
     return out;
 }
 
-int become(const std::string& subcommand, std::vector<std::string> command) {
-    std::vector<char*> argv;
-    for (std::string& argument : command) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    std::fflush(nullptr);
-    setenv("TUBULE_PROGRAM", std::filesystem::read_symlink("/proc/self/exe").c_str(), 1);
-    const Withheld interrupts;
-    execv(argv[0], argv.data());
-    say(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));
-    return no_picture;
+namespace {
+
+// HDF5 may crash over a damaged file: Python reads none.
+void refuse_damaged(const std::vector<std::string>& words) {
+    for (const std::string& word : words) {
+        const std::string file = word.starts_with("-") ? word.substr(word.find('=') + 1) : word;
+        if (is_hdf5(file) && !is_scan(file)) require_result(file);
+    }
+}
+
+}  // namespace
+
+bool is_forwarded(std::string_view command) {
+    return command == "plot" || command == "view" || command == "export" || command == "chart";
+}
+
+int forward(const std::string& command, const std::vector<std::string>& words) {
+    int failed = 2;
+    try {
+        refuse_damaged(words);
+        failed = 4;
+        std::vector<std::string> all = plot_command(command, command);
+        all.insert(all.end(), words.begin(), words.end());
+        return become(command, all);
+    } catch (const std::runtime_error& error) {
+        say(stderr, "{}\n", explanation(error));
+        return failed;
+    }
+}
+
+void add_plot(CLI::App& app, int&) {
+    app.add_subcommand("plot", "Draw shapes and cuts through them at the output times, and energies over time");
+}
+
+void add_view(CLI::App& app, int&) {
+    app.add_subcommand(
+        "view", "Write one HTML page with the shapes of a result, to turn in a browser, or with the map of a scan");
+}
+
+void add_export(CLI::App& app, int&) {
+    app.add_subcommand("export", "Write a shape of a result as flat triangles: STL, PLY or OBJ");
+}
+
+void add_chart(CLI::App& app, int&) {
+    app.add_subcommand("chart", "Run a case with many settings, and draw error against CPU time");
 }
 
 }  // namespace tubule

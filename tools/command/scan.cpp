@@ -6,22 +6,22 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/message.hpp"
 #include "common/solve/pause.hpp"
+#include "common/solve/stop.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/installed.hpp"
-#include "tools/command/ranked.hpp"
-#include "tools/command/text.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/scan/dispatcher.hpp"
 #include "tools/scan/extension.hpp"
-#include "tools/scan/rank_scan.hpp"
 
 namespace tubule {
 
@@ -88,7 +88,7 @@ ScanWriter grown_result(const ScanOptions& options) {
         if (options.resume) return ScanWriter::resume(options.choices.file, result.scan);
         if (options.extend) result = extended(result, options.choices.over);
         for (const std::string& other : options.merge) result = merged(result, read_scan_result(other));
-        return ScanWriter::extend(scan_path(options, result.scan), result, about_start());
+        return ScanWriter::create(scan_path(options, result.scan), result.scan, about_start(), result.points);
     } catch (const std::runtime_error& error) {
         throw CaseError(explanation(error));
     }
@@ -224,6 +224,33 @@ void add_scan(CLI::App& app, int& exit_status) {
               "tubule scan k42.hdf --extend --over energy.k42=0.05,0.15 --over shape.radius=1,1.2"},
              {{0}, {2}, {4, "a point could not be saved; --resume continues"}, {130}}, {"scans"});
     command->callback([o, &exit_status] { exit_status = scan(*o); });
+}
+
+int run_ranked(const std::function<int(Ranks*)>& root, const std::function<void(Ranks&)>& serve) {
+    std::optional<Ranks> ranks = Ranks::join();
+    if (!ranks) return root(nullptr);
+    if (ranks->rank() > 0) {
+        serve(*ranks);
+        return 0;
+    }
+    try {
+        return root(&*ranks);
+    } catch (const CaseError&) {
+        ranks->dismiss();  // thrown before any work was handed out
+        throw;
+    } catch (const Paused&) {  // likewise
+        ranks->dismiss();
+        throw;
+    } catch (const std::exception& error) {
+        say(stderr, "tubule: {}\n", explanation(error));
+        std::fflush(nullptr);
+        ranks->abort(exit_code(Stop::solver_failed));
+    }
+}
+
+void abort_interrupted(Ranks& ranks) {
+    std::fflush(nullptr);
+    ranks.abort(exit_code(Stop::interrupted));
 }
 
 }  // namespace tubule

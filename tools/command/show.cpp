@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -15,17 +14,16 @@
 #include <vector>
 
 #include "common/case/read.hpp"
+#include "common/result/about.hpp"
 #include "common/result/checksums.hpp"
 #include "common/result/record.hpp"
 #include "common/result/start_frame.hpp"
 #include "common/series/catalogue.hpp"
 #include "common/solve/message.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/show_scan.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
 #include "tools/command/units.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/scan/scan_file.hpp"
@@ -131,8 +129,6 @@ void add_summary(Text& out, const Result& result, const std::string& file, const
     line("file", file);
     line("title", title_of(result, file));
     if (!result.case_text.sets.empty()) line("set", fmt::format("{}", fmt::join(result.case_text.sets, "  ")));
-    const bool stopped =
-        std::any_of(result.about.begin(), result.about.end(), [](const auto& entry) { return entry.first == "stop"; });
     if (in.scales)
         line("units",
              fmt::format("1 of length is {}, of energy {}; of time {}", with_unit(1, lab_unit(in.scales, "length"), 4),
@@ -143,7 +139,7 @@ void add_summary(Text& out, const Result& result, const std::string& file, const
         const double* number = std::get_if<double>(&value);
         line(name, number && !unit.name.empty() ? with_unit(*number, unit, 12) : text_of(value));
     }
-    if (!stopped) line("stop", "none yet: the run is still going, or was killed");
+    if (!find_value<std::string>(result.about, "stop")) line("stop", "none yet: the run is still going, or was killed");
     const auto& times = result.series.at(result.series_names.front());
     line("rows", std::to_string(times.size()));
     line("frames", std::to_string(result.frames.size()));
@@ -350,10 +346,7 @@ int show(const ShowOptions& options) {
     } catch (const OutputError&) {
         throw;
     } catch (const std::runtime_error& error) {
-        const std::string words = explanation(error);
-        const bool named = words.find(options.file) != std::string::npos;
-        say(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", words);
-        return 2;
+        return refuse_file(options.file, explanation(error));
     }
 }
 

@@ -3,14 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <array>
-#include <iterator>
 #include <string_view>
 #include <vector>
 
-#include "tools/command/json.hpp"
-#include "tools/command/text.hpp"
+#include "common/result/about.hpp"
+#include "tools/command/output.hpp"
 #include "tools/scan/plan.hpp"
 #include "tools/scan/scan_file.hpp"
 
@@ -54,7 +52,7 @@ void add_map(std::string& out, const ScanResult& result) {
 Json equal_energies(const ScanResult& result) {
     const Nodes nodes(result.scan);
     Json out = Json::array();
-    for (const auto& [number, p] : result.crossings) {
+    for (const auto& [number, p] : result.more) {
         const EnergyCrossing c = crossing_of(result.scan, number);
         out.push_back({{"points", {nodes.point_of(c.node, 0), nodes.point_of(c.node + nodes.stride(c.axis), 0)}},
                        {"key", result.scan.axes[c.axis].keys.front()},
@@ -95,12 +93,9 @@ std::string scan_summary(const std::filesystem::path& file) {
     for (const Axis& axis : scan.axes) line(fmt::format("{}", fmt::join(axis.keys, ", ")), ends_of(axis));
     if (scan.boundary) line("boundary", scan.boundary->around ? std::string(name(*scan.boundary->around)) : "outcome");
     if (scan.boundary && scan.boundary->refine > 0) line("refine", fmt::format("{}", scan.boundary->refine));
-    bool stopped = false;
-    for (const auto& [key, value] : result.about) {
-        line(key, text_of(value));
-        stopped = stopped || key == "stop";
-    }
-    if (!stopped) line("stop", "none yet: the scan is still going, or was killed");
+    for (const auto& [key, value] : result.about) line(key, text_of(value));
+    if (!find_value<std::string>(result.about, "stop"))
+        line("stop", "none yet: the scan is still going, or was killed");
     std::array<std::size_t, n_outcomes> counts{};
     for (const PointResult& p : result.points) ++counts[static_cast<std::size_t>(p.outcome)];
     add(out, "\n{:>10}     outcome\n", "points");

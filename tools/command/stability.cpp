@@ -10,6 +10,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <variant>
 
@@ -26,11 +27,9 @@
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/installed.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/python.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
 #include "tools/run/continuation.hpp"
 
 namespace tubule {
@@ -175,9 +174,7 @@ std::optional<TubeSubject> tube_of(const Problem& c) {
 std::optional<double> mean_of(const Record& frame, const std::string& array) {
     const Array* found = find_array(frame, array);
     if (!found || found->data.empty()) return std::nullopt;
-    double sum = 0;
-    for (const double value : found->data) sum += value;
-    return sum / static_cast<double>(found->data.size());
+    return std::accumulate(found->data.begin(), found->data.end(), 0.0) / static_cast<double>(found->data.size());
 }
 
 // A frame that is a straight tube, to a thousandth of its radius.
@@ -296,10 +293,7 @@ int stability(const StabilityOptions& options) {
     } catch (const NoPicture& failure) {
         return failure.status;
     } catch (const std::invalid_argument& error) {
-        const std::string message = error.what();
-        const bool named = message.find(options.file) != std::string::npos;
-        say(stderr, "{}{}{}\n", named ? "" : options.file, named ? "" : ": ", message);
-        return 2;
+        return refuse_file(options.file, error.what());
     }
 }
 

@@ -18,8 +18,6 @@ inline constexpr int most_modes = 100;
 // Throws std::invalid_argument unless low <= value <= high. `option` names it.
 void require_within(const std::string& option, double value, double low, double high);
 
-enum class Output { words, csv, json };
-
 // Many fields: one for each option of the command.
 struct StabilityOptions {
     std::string file, model, q, fit, plot;
@@ -29,7 +27,6 @@ struct StabilityOptions {
     std::optional<long> frame;
     int modes = 2;
     bool numerical = false, csv = false, json = false;
-    Output output() const { return csv ? Output::csv : json ? Output::json : Output::words; }
 };
 
 // The case, and the frame of a result that is asked about; `result` where all of it is at hand.

@@ -13,7 +13,7 @@
 #include "common/theory/waves.hpp"
 #include "surface3d/curvature/surface_modes.hpp"
 #include "surface3d/run/mesh_record.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/units.hpp"
 

@@ -3,15 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <stdexcept>
 
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
 #include "common/result/frame_profile.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/stability.hpp"
-#include "tools/command/text.hpp"
 #include "tools/command/units.hpp"
 
 namespace tubule {
@@ -115,24 +113,17 @@ std::string words_of(const std::vector<Found>& found, double kT, const std::opti
     return out;
 }
 
-std::string csv_of_warm(const std::vector<Found>& found, double kT) {
-    std::string out = "model,m,number,eigenvalue,mean_square\n";
-    for (const Found& one : found)
-        for (const axisym::ModeRates& mode : one.warm->modes) {
-            const std::vector<double> means = mean_squares(kT, mode, one.warm->area);
-            for (std::size_t i = 0; i < means.size(); ++i)
-                add(out, "{},{},{},{:.17g},{:.17g}\n", name(one.problem.model), mode.m, i, -mode.rates[i], means[i]);
-        }
-    return out;
-}
-
-std::string csv_of(const std::vector<Found>& found) {
-    std::string out = "model,m,number,rate\n";
+std::string csv_of_spectra(const std::vector<Found>& found, std::optional<double> kT) {
+    Json rows = Json::array();
     for (const auto& [problem, spectrum, warm] : found)
-        for (const axisym::ModeRates& mode : spectrum.modes)
-            for (std::size_t i = 0; i < mode.rates.size(); ++i)
-                add(out, "{},{},{},{:.17g}\n", name(problem.model), mode.m, i, mode.rates[i]);
-    return out;
+        for (const axisym::ModeRates& mode : (kT ? *warm : spectrum).modes)
+            for (std::size_t i = 0; i < mode.rates.size(); ++i) {
+                rows.push_back({{"model", name(problem.model)}, {"m", mode.m}, {"number", i}, {"rate", mode.rates[i]}});
+                if (kT) rows.back()["eigenvalue"] = -mode.rates[i];
+                if (kT) rows.back()["mean_square"] = mean_squares(*kT, mode, warm->area)[i];
+            }
+    return kT ? csv_of({"model", "m", "number", "eigenvalue", "mean_square"}, rows)
+              : csv_of({"model", "m", "number", "rate"}, rows);
 }
 
 Json json_of_warm(const axisym::Spectrum& warm, double kT) {
@@ -192,14 +183,9 @@ std::string spectrum_report(const StabilityOptions& options, const StabilitySubj
             if (models.size() == 1) throw;
             refused += fmt::format("\n{}: none: {}\n", name(problem.model), error.what());
         }
-    switch (options.output()) {
-        case Output::csv:
-            return options.kT ? csv_of_warm(found, *options.kT) : csv_of(found);
-        case Output::json:
-            return json_text(found, options.kT.value_or(0));
-        default:
-            return words_of(found, options.kT.value_or(0), known_scales(subject.c)) + refused;
-    }
+    if (options.csv) return csv_of_spectra(found, options.kT);
+    if (options.json) return json_text(found, options.kT.value_or(0));
+    return words_of(found, options.kT.value_or(0), known_scales(subject.c)) + refused;
 }
 
 }  // namespace tubule

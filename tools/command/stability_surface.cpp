@@ -1,7 +1,6 @@
 // The slowest modes of a stationary surface in three dimensions.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
 #include <span>
 #include <stdexcept>
@@ -10,9 +9,8 @@
 #include "common/result/start_frame.hpp"
 #include "common/solve/sparse.hpp"
 #include "surface3d/run/equilibrium_run.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/stability.hpp"
-#include "tools/command/text.hpp"
 #include "tools/command/units.hpp"
 
 namespace tubule {
@@ -79,16 +77,12 @@ std::string words_of(const SurfaceModes& found, const std::optional<Scales>& sca
     return out;
 }
 
-std::string csv_of(const SurfaceModes& found) {
-    std::string out = "model,number,m,rate\n";
-    for (std::size_t i = 0; i < found.modes.size(); ++i)
-        add(out, "gradient-flow,{},{},{:.17g}\n", i + 1, found.modes[i].m, found.modes[i].rate);
-    return out;
+std::string csv_of_modes(Json modes) {
+    for (std::size_t i = 0; i < modes.size(); ++i) modes[i]["model"] = "gradient-flow", modes[i]["number"] = i + 1;
+    return csv_of({"model", "number", "m", "rate"}, modes);
 }
 
-std::string json_text(const SurfaceModes& found) {
-    Json modes = Json::array();
-    for (const auto& [rate, m] : found.modes) modes.push_back({{"m", m}, {"rate", rate}});
+std::string json_text(const SurfaceModes& found, const Json& modes) {
     Json out{{"shape", "surface"}};
     for (const char* name : {"energy", "energy_error", "tension", "pressure"}) out[name] = found.values.at(name);
     for (const char* name : {"negative_directions", "elements"})
@@ -123,14 +117,10 @@ std::string surface_report(const StabilityOptions& options, const StabilitySubje
     if (options.numerical || options.waves || !options.q.empty() || !options.plot.empty())
         refuse("--numerical, --waves, --q and --plot", "their modes are found one by one, see --rates");
     const SurfaceModes found = modes_of(problem_of(options, subject));
-    switch (options.output()) {
-        case Output::csv:
-            return csv_of(found);
-        case Output::json:
-            return json_text(found);
-        default:
-            return words_of(found, known_scales(subject.c));
-    }
+    if (!options.csv && !options.json) return words_of(found, known_scales(subject.c));
+    Json modes = Json::array();
+    for (const auto& [rate, m] : found.modes) modes.push_back({{"m", m}, {"rate", rate}});
+    return options.csv ? csv_of_modes(modes) : json_text(found, modes);
 }
 
 }  // namespace tubule

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <stdexcept>
 
 #include "common/case/text.hpp"
@@ -12,9 +11,8 @@
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/theory/waves.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/output.hpp"
 #include "tools/command/stability.hpp"
-#include "tools/command/text.hpp"
 #include "tools/command/units.hpp"
 #include "tools/scan/description.hpp"
 
@@ -395,19 +393,7 @@ std::string words_of(const TubeSubject& subject, const std::vector<ModelReport>&
     return to_string(out);
 }
 
-// ---- CSV and JSON
-
-std::string csv_of(const std::vector<ModelReport>& reports) {
-    Text out;
-    add(out, "model,tension,m,n,q,rate,frequency,factor,mean_square\n");
-    for (const ModelReport& report : reports)
-        for (const WaveRow& row : report.rows)
-            add(out, "{},{:.17g},{},{},{:.17g},{:.17g},{:.17g},{},{}\n", name(report.problem.model),
-                report.tube.tension, row.m, row.n ? std::to_string(*row.n) : "", row.q, row.growth.rate(),
-                row.growth.frequency(), row.factor ? fmt::format("{:.17g}", *row.factor) : "",
-                row.mean_square ? fmt::format("{:.17g}", *row.mean_square) : "");
-    return to_string(out);
-}
+// ---- JSON and CSV
 
 Json json_of(const std::vector<std::complex<double>>& roots) {
     return json_list(roots, [](const auto& root) { return Json{root.real(), root.imag()}; });
@@ -465,6 +451,17 @@ Json json_of(const TubeSubject& subject, const std::vector<Threshold>& limits, i
             {"models", models}};
 }
 
+// A row for each wave of each model.
+std::string csv_of_waves(const Json& models) {
+    Json rows = Json::array();
+    for (const Json& model : models)
+        for (Json wave : model["waves"]) {
+            wave["model"] = model["model"], wave["tension"] = model["tension"];
+            rows.push_back(std::move(wave));
+        }
+    return csv_of({"model", "tension", "m", "n", "q", "rate", "frequency", "factor", "mean_square"}, rows);
+}
+
 }  // namespace
 
 std::string tube_report(const StabilityOptions& options, const TubeSubject& subject,
@@ -472,15 +469,9 @@ std::string tube_report(const StabilityOptions& options, const TubeSubject& subj
     std::vector<ModelReport> reports;
     for (const Problem& model : models) reports.push_back(report_of(options, subject, model));
     const std::vector<Threshold> limits = thresholds(subject.tube, options.modes);
-    switch (options.output()) {
-        case Output::csv:
-            return csv_of(reports);
-        case Output::json:
-            return line_of(json_of(subject, limits, options.modes,
-                                   json_list(reports, [](const ModelReport& one) { return json_of(one); })));
-        default:
-            return words_of(subject, reports, limits, options.modes);
-    }
+    if (!options.csv && !options.json) return words_of(subject, reports, limits, options.modes);
+    const Json list = json_list(reports, [](const ModelReport& one) { return json_of(one); });
+    return options.csv ? csv_of_waves(list) : line_of(json_of(subject, limits, options.modes, list));
 }
 
 // Rates over a range of wave numbers that holds all bands and the waves of the table.
@@ -529,18 +520,16 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
     const int last = options.waves.value_or(6);
     Text out;
     Json list = Json::array();
-    if (options.csv) add(out, "model,l,rate,frequency,mean_square\n");
-    if (!options.csv)
-        add(out, "sphere of radius {}; {}; for any m <= l\n", with_unit(sphere.radius, in.length, 8),
-            moduli(sphere.energy));
+    add(out, "sphere of radius {}; {}; for any m <= l\n", with_unit(sphere.radius, in.length, 8),
+        moduli(sphere.energy));
     for (const Problem& c : models) {
         const MotionLaw& law = c.law;
         const bool swings = law.inertia != 0, moves = law.unconstrained();
         theory::UniformSphere loaded = sphere;
         if (!options.tension && law.area_is_free()) loaded.tension = law.tension.at(0);
         const double radius_rate = law.pressure.at(0) - theory::pressure_at_rest(loaded);
-        if (!options.csv) add(out, "\n{}\n  tension {}\n", words_of_model(c), with_unit(loaded.tension, in.tension, 8));
-        if (!options.csv && moves)
+        add(out, "\n{}\n  tension {}\n", words_of_model(c), with_unit(loaded.tension, in.tension, 8));
+        if (moves)
             add(out, "  the radius changes at the rate {}: growth rates hold at this instant only\n",
                 with_unit(radius_rate, in.velocity, 6));
         const auto warm = [&](int l) -> std::optional<double> {
@@ -554,34 +543,29 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
                 refuse_motion(fmt::format("the pressure of equilibrium is {:.9g}", theory::pressure_at_rest(loaded)));
             warm(0);
         }
-        if (!options.csv)
-            add(out, "    l {:>14}{} {:>12}{}\n", "rate", swings ? "      frequency" : "", "e-fold in",
-                options.kT ? "    mean square" : "");
-        if (!options.csv && scales) add(out, "      {}\n", unit_columns(swings, options.kT.has_value(), in));
+        add(out, "    l {:>14}{} {:>12}{}\n", "rate", swings ? "      frequency" : "", "e-fold in",
+            options.kT ? "    mean square" : "");
+        if (scales) add(out, "      {}\n", unit_columns(swings, options.kT.has_value(), in));
         for (int l = moves ? 0 : 2; l <= last; l += l == 0 ? 2 : 1) {
             const theory::Growth found = growth(loaded, law, l);
             const double s = found.rate();
             const std::optional<double> mean = warm(l);
-            if (options.csv) {
-                add(out, "{},{},{:.17g},{:.17g},{}\n", name(c.model), l, s, found.frequency(),
-                    mean ? fmt::format("{:.17g}", *mean) : "");
-            } else {
-                add(out, "{:>5} {}{}\n", l, columns(found, swings, mean, in),
-                    s > 0    ? "  grows"
-                    : s == 0 ? "  neutral"
-                             : "");
-            }
+            add(out, "{:>5} {}{}\n", l, columns(found, swings, mean, in),
+                s > 0    ? "  grows"
+                : s == 0 ? "  neutral"
+                         : "");
             list.push_back({{"model", name(c.model)},
                             {"l", l},
                             {"rate", s},
                             {"roots", json_of(found.roots)},
                             {"mean_square", or_null(mean)}});
+            if (options.csv) list.back()["frequency"] = found.frequency();
         }
     }
-    if (options.json)
-        return line_of(
-            {{"shape", "sphere"}, {"radius", sphere.radius}, {"energy", moduli(sphere.energy)}, {"waves", list}});
-    return to_string(out);
+    if (options.csv) return csv_of({"model", "l", "rate", "frequency", "mean_square"}, list);
+    if (!options.json) return to_string(out);
+    return line_of(
+        {{"shape", "sphere"}, {"radius", sphere.radius}, {"energy", moduli(sphere.energy)}, {"waves", list}});
 }
 
 }  // namespace tubule

@@ -14,10 +14,8 @@
 #include "common/case/read.hpp"
 #include "common/series/catalogue.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/help.hpp"
-#include "tools/command/installed.hpp"
-#include "tools/command/streams.hpp"
-#include "tools/command/text.hpp"
+#include "tools/command/options.hpp"
+#include "tools/command/output.hpp"
 #include "tools/run/continuation.hpp"
 
 namespace tubule {

@@ -6,7 +6,7 @@
 
 #include "common/case/units.hpp"
 #include "common/result/result.hpp"
-#include "tools/command/json.hpp"
+#include "tools/command/output.hpp"
 
 namespace tubule {
 

@@ -8,7 +8,7 @@
 #include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/compare/distance.hpp"
-#include "tools/compare/same_kind.hpp"
+#include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare {
 

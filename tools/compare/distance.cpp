@@ -6,7 +6,7 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
-#include "tools/compare/same_kind.hpp"
+#include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare {
 

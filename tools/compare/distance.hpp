@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "tools/compare/surface.hpp"
+#include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare {
 

@@ -6,25 +6,17 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/result/about.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/result/record.hpp"
 #include "surface3d/run/mesh_record.hpp"
-#include "tools/compare/revolution_surface.hpp"
-#include "tools/compare/triangle_surface.hpp"
+#include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare {
 
 namespace {
 
 constexpr double same_frame = 1e-6;
-
-template <class T>
-std::optional<T> about(const Result& result, const std::string& name) {
-    for (const auto& [key, value] : result.about)
-        if (key == name)
-            if (const T* held = std::get_if<T>(&value)) return *held;
-    return {};
-}
 
 // By area. A period of a tube may begin anywhere, so that it is on the axis.
 Eigen::Vector3d centre(const Surface& surface) {
@@ -59,20 +51,24 @@ std::unique_ptr<Surface> surface_of(const Result& result, std::size_t frame, cha
 }  // namespace
 
 std::string stop_word(const Result& result) {
-    return about<std::string>(result, "stop").value_or("unfinished");
+    const auto* stop = find_value<std::string>(result.about, "stop");
+    return stop ? *stop : "unfinished";
 }
 
 double stop_time(const Result& result) {
     const auto& times = result.series.at("time");
-    return about<double>(result, "stop_time").value_or(times.empty() ? 0 : times.back());
+    const auto* stop = find_value<double>(result.about, "stop_time");
+    return stop ? *stop : times.empty() ? 0 : times.back();
 }
 
 double reference_energy(const Result& result) {
-    return about<double>(result, "E_ref").value_or(0);
+    const auto* energy = find_value<double>(result.about, "E_ref");
+    return energy ? *energy : 0;
 }
 
 std::optional<double> stated_error(const Result& result) {
-    return about<double>(result, "estimated_error");
+    const auto* error = find_value<double>(result.about, "estimated_error");
+    return error ? std::optional(*error) : std::nullopt;
 }
 
 std::vector<FramePair> frames_in_common(const Result& a, const Result& b) {

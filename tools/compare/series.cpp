@@ -1,4 +1,3 @@
-#include "tools/compare/series.hpp"
 
 #include <algorithm>
 #include <cmath>

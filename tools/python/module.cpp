@@ -28,7 +28,6 @@
 #include "common/theory/waves.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
-#include "tools/command/compare.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/units.hpp"
 #include "tools/python/memory_result.hpp"

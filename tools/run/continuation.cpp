@@ -8,11 +8,11 @@
 #include <fstream>
 #include <map>
 #include <set>
-#include <string_view>
 
 #include "common/case/read.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
+#include "common/result/about.hpp"
 #include "common/result/start_frame.hpp"
 #include "common/run/run.hpp"
 
@@ -38,19 +38,6 @@ bool holds_tables(const toml::node& node) {
     return list && !list->empty() && list->front().is_table();
 }
 
-// All values under their full keys, as in --set.
-void flatten(const toml::node& node, const std::string& key, std::map<std::string, std::string>& out) {
-    const auto below = [&](const std::string& name) { return key.empty() ? name : key + "." + name; };
-    if (const auto* table = node.as_table()) {
-        for (const auto& [name, value] : *table) flatten(value, below(std::string(name.str())), out);
-    } else if (holds_tables(node)) {
-        for (std::size_t i = 0; i < node.as_array()->size(); ++i)
-            flatten(*node.as_array()->get(i), below(std::to_string(i)), out);
-    } else {
-        out[key] = value_text(node);
-    }
-}
-
 // When a run ends and what it writes, not what it computes.
 bool may_change(const Difference& d) {
     return d.key == "time.end" || d.key == "time.output" || d.key == "time.stationary";
@@ -66,20 +53,20 @@ std::string unreadable(const CaseError& error) {
 
 // Folder and name of the case file, from which its paths are read. Older results do not tell: then its own.
 std::string path_of_case(const Result& result, const std::filesystem::path& file) {
-    for (const auto& [name, value] : result.about)
-        if (const auto* text = std::get_if<std::string>(&value); text && name == "case_path") return *text;
-    return file.string();
+    const auto* path = find_value<std::string>(result.about, "case_path");
+    return path ? *path : file.string();
 }
 
 }  // namespace
 
 std::map<std::string, std::string> values_of(const Case& c) {
     std::map<std::string, std::string> out;
-    flatten(parse_toml(effective_toml(c), c.path), "", out);
-    std::erase_if(out, [](const auto& entry) {
-        const std::string& key = entry.first;
-        return key.starts_with("about.") || key.starts_with("units.") || key.starts_with("expect.") ||
-               key == "time.limit";
+    walk(parse_toml(effective_toml(c), c.path), "", [&](const std::string& key, const toml::node& node) {
+        if (node.is_table() || holds_tables(node)) return true;
+        if (!key.starts_with("about.") && !key.starts_with("units.") && !key.starts_with("expect.") &&
+            key != "time.limit")
+            out[key] = value_text(node);
+        return false;
     });
     return out;
 }
@@ -145,9 +132,8 @@ std::optional<std::size_t> frame_index(const Result& result, long number) {
 }
 
 std::optional<Stop> stop_of(const Result& result) {
-    for (const auto& [name, value] : result.about)
-        if (name == "stop") return stop_from_name(std::get<std::string>(value));
-    return std::nullopt;
+    const auto* stop = find_value<std::string>(result.about, "stop");
+    return stop ? stop_from_name(*stop) : std::nullopt;
 }
 
 CaseInputs inputs_to_resume(const std::filesystem::path& file) {

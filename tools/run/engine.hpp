@@ -9,7 +9,7 @@
 #include "common/case/problem.hpp"
 #include "common/result/record.hpp"
 #include "common/run/run.hpp"
-#include "tools/auto/choice.hpp"
+#include "tools/auto/auto_run.hpp"
 
 namespace tubule {
 

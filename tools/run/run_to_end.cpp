@@ -1,7 +1,7 @@
 #include "tools/run/run_to_end.hpp"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,10 @@
 #include <string>
 
 #include "common/case/read.hpp"
+#include "common/case/toml_input.hpp"
 #include "common/result/durable_io.hpp"
+#include "tools/run/case_checks.hpp"
 #include "tools/run/forecast.hpp"
-#include "tools/run/physics_notes.hpp"
 
 namespace tubule {
 namespace {
@@ -19,33 +20,18 @@ namespace {
 // Beyond this, and below its inverse, fourth powers and their products with a modulus need not be finite.
 constexpr double extreme = 1e50;
 
-// Numbers of a case beyond that, "key = value", joined by commas.
-std::string extreme_numbers(const toml::node& node, const std::string& key) {
-    std::string found;
-    const auto add = [&](const std::string& more) {
-        if (!more.empty()) found += (found.empty() ? "" : ", ") + more;
-    };
-    const auto under = [&](std::string_view name) {
-        return key.empty() ? std::string(name) : fmt::format("{}.{}", key, name);
-    };
-    if (const toml::table* table = node.as_table())
-        for (const auto& [name, value] : *table) add(extreme_numbers(value, under(name.str())));
-    if (const toml::array* list = node.as_array())
-        for (std::size_t i = 0; i < list->size(); ++i) add(extreme_numbers((*list)[i], under(std::to_string(i))));
-    if (node.is_number()) {
-        const double size = std::abs(node.value<double>().value());
-        if (size > extreme || (size > 0 && size < 1 / extreme))
-            return fmt::format("{} = {}", key, node.value<double>().value());
-    }
-    return found;
-}
-
 // Replaces the message of a run that failed where numbers of the case are so large or small that their powers and
 // products need not be finite.
 void blame_extreme_numbers(const Problem& c, StopReport& stop) {
-    const std::string numbers = extreme_numbers(toml::parse(effective_toml(c)), "");
+    std::vector<std::string> numbers;
+    walk(toml::parse(effective_toml(c)), "", [&](const std::string& key, const toml::node& node) {
+        const double value = node.is_number() ? node.value<double>().value() : 0, size = std::abs(value);
+        if (size > extreme || (size > 0 && size < 1 / extreme)) numbers.push_back(fmt::format("{} = {}", key, value));
+        return true;
+    });
     if (numbers.empty()) return;
-    stop.message = fmt::format("the numbers of the case are too large or too small to compute with: {}", numbers);
+    stop.message =
+        fmt::format("the numbers of the case are too large or too small to compute with: {}", fmt::join(numbers, ", "));
     stop.advice = "choose units in which they are nearer to 1";
 }
 

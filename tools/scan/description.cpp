@@ -10,6 +10,7 @@
 
 #include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
+#include "common/case/reader.hpp"
 #include "common/case/text.hpp"
 #include "common/case/toml_input.hpp"
 #include "common/result/start_frame.hpp"
@@ -78,71 +79,30 @@ std::optional<Axis> parse_range(const std::string& text, const std::string& sour
 
 // ---- scan files
 
-const std::vector<std::string> file_keys{"title",    "case",  "set",    "over", "points",
-                                         "boundary", "seeds", "refine", "until"};
-
-[[noreturn]] void refuse(const std::string& path, const toml::source_region& where, const std::string& complaint) {
-    throw CaseError(fmt::format("{}:{}:{}: {}", path, where.begin.line, where.begin.column, complaint));
-}
-
-std::string text_in(const toml::table& root, const std::string& path, const char* key) {
-    const toml::node* node = root.get(key);
-    if (!node) return "";
-    if (!node->is_string()) refuse(path, node->source(), fmt::format("{} must be a string", key));
-    return node->as_string()->get();
-}
-
-std::vector<std::string> texts_in(const toml::table& root, const std::string& path, const char* key) {
-    const toml::node* node = root.get(key);
-    if (!node) return {};
-    if (!node->is_array()) refuse(path, node->source(), fmt::format("{} must be a list of strings", key));
-    std::vector<std::string> texts;
-    for (const toml::node& entry : *node->as_array()) {
-        if (!entry.is_string()) refuse(path, entry.source(), fmt::format("{} must be a list of strings", key));
-        texts.push_back(entry.as_string()->get());
-    }
-    return texts;
-}
-
 struct ScanFile {
-    std::string title, case_path, points, boundary;
-    std::vector<std::string> sets, over;
-    std::optional<int> seeds, refine;
-    bool to_the_end = false;
+    std::string title, case_path;
+    ScanChoices choices;
 };
 
-std::optional<int> integer_in(const toml::table& root, const std::string& path, const char* key) {
-    const toml::node* node = root.get(key);
-    if (!node) return std::nullopt;
-    const auto value = node->value_exact<std::int64_t>();
-    if (!value) refuse(path, node->source(), fmt::format("{} must be an integer", key));
-    return static_cast<int>(std::clamp<std::int64_t>(*value, -1, 1'000'000));
-}
-
 ScanFile read_scan_file(const toml::table& root, const std::string& path) {
-    for (const auto& [key, node] : root) {
-        if (std::find(file_keys.begin(), file_keys.end(), key.str()) != file_keys.end()) continue;
-        const auto meant = near_miss(key.str(), file_keys);
-        refuse(path, key.source(),
-               fmt::format("unknown key {}{} Allowed here: {}", std::string(key.str()),
-                           meant ? fmt::format("; did you mean '{}'?", *meant) : ";", fmt::join(file_keys, ", ")));
-    }
     ScanFile file;
+    ScanChoices& c = file.choices;
+    Complaints complaints;
+    Reader::read(root, "", path + ":1:1", complaints, [&](Reader& k) {
+        k.text("title", file.title);
+        k.text("case", file.case_path);
+        k.texts("set", c.sets);
+        k.texts("over", c.over);
+        k.text("points", c.points);
+        k.text("boundary", c.boundary);
+        k.integer("seeds", c.seeds, {.from = 1});
+        k.integer("refine", c.refine, {.from = 0, .to = most_halvings});
+        k.choice("until", c.to_the_end, {{"decided", false}, {"end", true}});
+    });
+    if (complaints.any()) throw CaseErrors(std::move(complaints.found));
     const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-    file.title = text_in(root, path, "title");
-    file.case_path = (folder / text_in(root, path, "case")).string();
-    file.sets = texts_in(root, path, "set");
-    file.over = texts_in(root, path, "over");
-    file.boundary = text_in(root, path, "boundary");
-    if (const std::string points = text_in(root, path, "points"); !points.empty())
-        file.points = (folder / points).string();
-    file.seeds = integer_in(root, path, "seeds");
-    file.refine = integer_in(root, path, "refine");
-    const std::string until = text_in(root, path, "until");
-    if (!until.empty() && until != "decided" && until != "end")
-        refuse(path, root.get("until")->source(),
-               fmt::format("until must be \"decided\" or \"end\", not \"{}\"", until));
-    file.to_the_end = until == "end";
+    file.case_path = (folder / file.case_path).string();
+    if (!c.points.empty()) c.points = (folder / c.points).string();
     return file;
 }
 
@@ -153,7 +113,7 @@ std::string named(bool by_option, const Scan& scan, const std::string& key) {
     return by_option ? "--" + key + ":" : fmt::format("{}: {}", scan.path, key);
 }
 
-BoundaryChoice boundary_of(const Scan& scan, const ScanFile& file, const ScanChoices& given) {
+BoundaryChoice boundary_of(const Scan& scan, const ScanChoices& file, const ScanChoices& given) {
     const std::string name = given.boundary.empty() ? file.boundary : given.boundary;
     BoundaryChoice choice;
     if (name != "outcome") {
@@ -426,7 +386,7 @@ void add_inputs(Scan& scan) {
 namespace {
 
 // What varies, and the line that is looked for: of the file, where the choices have nothing else.
-Scan with_choices(Scan scan, const ScanFile& file, const ScanChoices& choices) {
+Scan with_choices(Scan scan, const ScanChoices& file, const ScanChoices& choices) {
     scan.axes = axes_of(file.over, choices.over);
     const std::string points = choices.points.empty() ? file.points : choices.points;
     if (!points.empty()) scan.axes.insert(scan.axes.begin(), parse_table(read_input(points, largest_table), points));
@@ -470,9 +430,9 @@ Scan read_scan(const ScanChoices& choices) {
         scan.case_text = text;
     }
     scan.title = file.title;
-    scan.sets = file.sets;
+    scan.sets = file.choices.sets;
     scan.sets.insert(scan.sets.end(), choices.sets.begin(), choices.sets.end());
-    return with_choices(std::move(scan), file, choices);
+    return with_choices(std::move(scan), file.choices, choices);
 }
 
 Scan scan_of(const Case& c, const ScanChoices& choices) {

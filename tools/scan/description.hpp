@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "tools/scan/between.hpp"
 #include "tools/scan/outcome.hpp"
+#include "tools/scan/plan.hpp"
 
 namespace tubule {
 

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -14,9 +16,24 @@
 #include "common/solve/pause.hpp"
 
 namespace tubule {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Axis, keys, values, logarithmic)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CaseInput, name, size, crc, bytes)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyCrossing, node, axis, kinds, starts, differences)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PointResult, point, outcome, stop, value, measures, message)
+
 namespace {
 
 constexpr std::size_t most_threads = 256;
+
+// From a task, {number} or {number, crossing}, to its result.
+Compute compute_of(const Scan& scan) {
+    return [scan = std::make_shared<const Scan>(scan)](const Packet& task) -> Packet {
+        Work work{task[0], {}};
+        if (task.size() > 1) work.crossing = task[1].get<EnergyCrossing>();
+        return run_one(*scan, work);
+    };
+}
 
 }  // namespace
 
@@ -25,12 +42,13 @@ Dispatcher::Dispatcher(ScanWriter& writer, bool quiet)
     progress_.begin(plan_.known());
 }
 
-NextTask Dispatcher::take(Work& work, bool may_wait) {
+NextTask Dispatcher::take(Packet& task, bool may_wait) {
     std::unique_lock lock(mutex_);
     while (true) {
         if (error_ || interrupted() || pause_is_due()) return NextTask::over;
         if (const auto next = plan_.next()) {
-            work = *next;
+            task = Packet::array({next->number});
+            if (next->crossing) task.push_back(*next->crossing);
             ++running_;
             return NextTask::ready;
         }
@@ -40,7 +58,8 @@ NextTask Dispatcher::take(Work& work, bool may_wait) {
     }
 }
 
-void Dispatcher::give(const PointResult& result) {
+void Dispatcher::give(const Packet& packet) {
+    const auto result = packet.get<PointResult>();
     const std::lock_guard lock(mutex_);
     --running_;
     changed_.notify_all();
@@ -69,11 +88,10 @@ bool Dispatcher::was_interrupted() const {
 }
 
 PointResult run_one(const Scan& scan, const Work& work) {
-    const auto stopped = [] { return interrupted(); };
     PointResult result;
     try {
-        result = work.crossing ? find_crossing(scan, *work.crossing, stopped)
-                               : run_point(scan.case_of(work.number), scan.to_the_end, stopped);
+        result =
+            work.crossing ? find_crossing(scan, *work.crossing) : run_point(scan.case_of(work.number), scan.to_the_end);
     } catch (const CaseError& error) {
         result = refused_point(error.what());
     }
@@ -90,13 +108,10 @@ int scan_threads(std::optional<int> asked) {
 int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
     jobs = static_cast<int>(std::min<std::size_t>({static_cast<std::size_t>(jobs), scan.size(), most_threads}));
     const int processors = omp_get_max_threads();
+    const Compute compute = compute_of(scan);
     const auto work = [&] {
         omp_set_num_threads(std::max(1, processors / jobs));  // of this thread: points share the processors
-        try {
-            for (Work work; dispatcher.take(work, true) == NextTask::ready;) dispatcher.give(run_one(scan, work));
-        } catch (...) {
-            dispatcher.fail(std::current_exception());
-        }
+        work_off(dispatcher, compute);
     };
     std::vector<std::thread> crew;
     crew.reserve(static_cast<std::size_t>(jobs));
@@ -107,6 +122,57 @@ int run_scan(Dispatcher& dispatcher, const Scan& scan, int jobs) {
     work();
     for (std::thread& thread : crew) thread.join();
     return static_cast<int>(crew.size()) + 1;
+}
+
+Packet to_packet(const Scan& scan) {
+    Packet inputs = Packet::array();
+    for (const auto& input : scan.inputs) inputs.push_back(*input);
+    return {{"path", scan.path}, {"case_path", scan.case_path},        {"case_text", scan.case_text},
+            {"inputs", inputs},  {"to_the_end", scan.to_the_end},      {"sets", scan.sets},
+            {"axes", scan.axes}, {"halvings", scan.between().halvings}};
+}
+
+Scan scan_from(const Packet& in) {
+    Scan scan;
+    scan.path = in["path"], scan.case_path = in["case_path"], scan.case_text = in["case_text"];
+    for (const Packet& input : in["inputs"])
+        scan.inputs.push_back(std::make_shared<const CaseInput>(input.get<CaseInput>()));
+    scan.to_the_end = in["to_the_end"];
+    in["sets"].get_to(scan.sets), in["axes"].get_to(scan.axes);
+    scan.boundary = BoundaryChoice{.around = {}, .refine = in["halvings"]};  // by which points between are numbered
+    return scan;
+}
+
+int run_scan(Ranks& ranks, Dispatcher& dispatcher, const Scan& scan) {
+    return ranks.run(dispatcher, to_packet(scan), compute_of(scan));
+}
+
+void serve_scan(Ranks& ranks) {
+    ranks.serve([](const Packet& header) { return compute_of(scan_from(header)); });
+}
+
+ScanProgress::~ScanProgress() {
+    if (drawn_) style_.wipe();
+}
+
+void ScanProgress::begin(std::size_t known) {
+    begun_with_ = known;
+    begun_at_ = style_.clock();
+    next_ = begun_at_ + style_.interval();
+}
+
+void ScanProgress::operator()(std::size_t known, std::size_t wanted, bool follows) {
+    if (style_.quiet) return;
+    const double now = style_.clock();
+    if (now < next_) return;
+    next_ = now + style_.interval();
+    wanted = std::max(wanted, known);
+    const double left =
+        (now - begun_at_) / static_cast<double>(known - begun_with_) * static_cast<double>(wanted - known);
+    const auto words = fmt::format("{} of {} points{}, left {}", known, wanted, follows ? " so far" : "",
+                                   (follows ? "at least " : "") + duration(left));
+    style_.show(ProgressStyle::bar_width * known / std::max<std::size_t>(wanted, 1), words);
+    drawn_ = true;
 }
 
 }  // namespace tubule

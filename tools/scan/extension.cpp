@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
@@ -14,7 +13,7 @@
 #include "common/case/read.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/run/continuation.hpp"
-#include "tools/scan/scan_plan.hpp"
+#include "tools/scan/starts.hpp"
 
 namespace tubule {
 namespace {
@@ -173,25 +172,10 @@ void add_axes_of(Scan& scan, const Scan& other) {
     }
 }
 
-// A point of the grid, between two of them, or a crossing, if it is known.
-std::optional<PointResult> known_result(const ScanResult& result, std::size_t number) {
-    if (number < result.points.size()) {
-        const PointResult& p = result.points[number];
-        return p.outcome == Outcome::not_run ? std::nullopt : std::optional(p);
-    }
-    if (const auto crossing = result.crossings.find(number); crossing != result.crossings.end())
-        return crossing->second;
-    const auto between = result.between.find(number);
-    if (between == result.between.end()) return std::nullopt;
-    PointResult p = unknown_point(number);
-    p.outcome = between->second;
-    return p;
-}
-
 }  // namespace
 
 ScanResult extended(const ScanResult& result, const std::vector<std::string>& over) {
-    ScanResult out{.scan = result.scan, .about = {}, .points = {}, .between = {}, .crossings = {}};
+    ScanResult out{result.scan, {}, {}, {}};
     for (const std::string& text : over) {
         const Axis more = parse_axis(text);
         if (!axis_of(out.scan, more.keys)) {
@@ -207,7 +191,7 @@ ScanResult extended(const ScanResult& result, const std::vector<std::string>& ov
 
 ScanResult merged(const ScanResult& a, const ScanResult& b) {
     refuse_different(a.scan, b.scan);
-    ScanResult out{.scan = a.scan, .about = {}, .points = {}, .between = {}, .crossings = {}};
+    ScanResult out{a.scan, {}, {}, {}};
     out.scan.inputs.insert(out.scan.inputs.end(), b.scan.inputs.begin(), b.scan.inputs.end());
     Scan other = b.scan;
     for (const std::string& key : told_apart(a.scan, b.scan))
@@ -225,15 +209,14 @@ void drop_unwanted(ScanResult& result) {
     ScanPlan plan(result.scan);
     std::set<std::size_t> wanted;
     while (const auto work = plan.next()) {
-        const auto known = known_result(result, work->number);
+        const PointResult* known = result.known(work->number);
         if (!known) return;  // unfinished: all that is known may be of use
         wanted.insert(work->number);
         plan.done(*known);
     }
     for (PointResult& p : result.points)
         if (!wanted.contains(p.point)) p = unknown_point(p.point);
-    std::erase_if(result.between, [&](const auto& entry) { return !wanted.contains(entry.first); });
-    std::erase_if(result.crossings, [&](const auto& entry) { return !wanted.contains(entry.first); });
+    std::erase_if(result.more, [&](const auto& entry) { return !wanted.contains(entry.first); });
 }
 
 }  // namespace tubule

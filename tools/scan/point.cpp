@@ -6,12 +6,17 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <variant>
 
+#include "axisym/curve/curve_measures.hpp"
+#include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_output.hpp"
 #include "common/case/read.hpp"
+#include "common/result/frame_profile.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/dense.hpp"
+#include "common/solve/interrupt.hpp"
 #include "tools/run/run_to_end.hpp"
 #include "tools/scan/uniform_fate.hpp"
 
@@ -40,9 +45,7 @@ int column(const std::vector<std::string>& series, const char* name) {
 // Keeps the last row and the last frame, and ends the run when its fate is known.
 class Watch : public RunObserver {
 public:
-    Watch(const Problem& c, const std::vector<std::string>& series, bool to_the_end,
-          const std::function<bool()>& interrupted)
-        : interrupted_(interrupted) {
+    Watch(const Problem& c, const std::vector<std::string>& series, bool to_the_end) {
         for (const char* name : {"energy", "volume", "r_min", "r_max", "area"})
             columns_.push_back(column(series, name));
         if (!to_the_end) fate_ = UniformFate::of(c);
@@ -61,7 +64,7 @@ public:
         last_frame.reset();
         decided = false;
     }
-    bool interrupted() override { return decided || interrupted_(); }
+    bool interrupted() override { return decided || tubule::interrupted(); }
 
     double energy() const { return last(0); }
     EndShape end(bool periodic) const { return {periodic, last(2), last(3), last(4), last(1)}; }
@@ -75,7 +78,6 @@ private:
         return at < 0 || at >= static_cast<int>(row_.size()) ? unknown : row_[static_cast<std::size_t>(at)];
     }
 
-    const std::function<bool()>& interrupted_;
     std::optional<UniformFate> fate_;
     bool keeps_frame_;
     std::vector<int> columns_;
@@ -135,13 +137,13 @@ PointResult summed_up(const Problem& c, const RunSummary& s, const Watch& watch)
 }
 
 // A run that ends as stationary without being at rest goes on from there, to where it really goes.
-PointResult computed(Case given, bool to_the_end, const std::function<bool()>& interrupted) {
+PointResult computed(Case given, bool to_the_end) {
     given.time.output.clear();
     double steps = 0;
     for (std::optional<Restart> from;;) {
         const Problem c = given;
         const Engine engine(c);
-        Watch watch(c, engine.series_names(), to_the_end, interrupted);
+        Watch watch(c, engine.series_names(), to_the_end);
         const RunSummary summary = engine.run(watch, from ? &*from : nullptr);
         PointResult p = summed_up(c, summary, watch);
         p[Measure::steps] = steps += p[Measure::steps];
@@ -156,6 +158,63 @@ PointResult computed(Case given, bool to_the_end, const std::function<bool()>& i
             *given.time.stationary *= next_stationarity;
         from = Restart{std::move(*watch.last_frame)};
     }
+}
+
+// Points along the whole cell or period.
+ProfilePoints points_of(const axisym::Equilibrium& shape) {
+    constexpr int intervals = 400;
+    const Curve whole = axisym::meridian(*shape.space, shape.x);
+    ProfilePoints out{{}, {}, whole.length};
+    for (int i = 0; i <= intervals; ++i) {
+        const auto at = whole.at(static_cast<double>(i) / intervals);
+        out.r.push_back(at[0]), out.z.push_back(at[2]);
+    }
+    return out;
+}
+
+struct Interruptible : RunObserver {
+    bool interrupted() override { return tubule::interrupted(); }
+};
+
+Outcome outcome_of_shape(const axisym::Equilibrium& shape, const ProfilePoints& profile, const EndShape& end) {
+    if (shape.stop != Stop::finished) return outcome_of(shape.stop, end);
+    if (shape.space->topology() == Topology::cell) return cell_at_rest(profile.r, profile.z, end.area, end.volume);
+    return outcome_of(Stop::stationary, end);
+}
+
+// The shape that a case with [equilibrium] finds. Throws as the search.
+PointResult equilibrium_point(const Problem& c) {
+    Interruptible observer;
+    const auto [shape, modes, limit, meets_constraints] = axisym::find_shape(c, observer);
+    PointResult p = unknown_point(0);
+    p.stop = stop_word(shape.stop);
+    p.message = shape.stop == Stop::finished ? "the shape is stationary" : shape.message;
+    p[Measure::energy_error] = shape.estimated_error;
+    p[Measure::E_ref] = shape.reference_energy;
+    p[Measure::elements] = shape.space->images() * shape.space->splines().elements();
+    if (limit) p[Measure::limit_energy] = limit->energy;
+    const bool tube = std::holds_alternative<Tube>(c.shape);
+    ProfilePoints profile;
+    if (shape.stop == Stop::finished || shape.stop == Stop::self_intersection) {
+        profile = points_of(shape);
+        const axisym::ShapeMeasures measured = axisym::measures(*shape.space, shape.x);
+        p[Measure::energy] = shape.observed.energy;
+        p[Measure::area] = shape.observed.area;
+        p[Measure::volume] = shape.observed.volume;
+        p[Measure::r_max] = measured.r_max;
+        if (tube) p[Measure::r_min] = *std::min_element(profile.r.begin(), profile.r.end());
+        p[Measure::height] = measured.height;
+        p[Measure::tension] = shape.sigma;
+        p[Measure::pressure] = -shape.lambda;
+    }
+    if (meets_constraints)
+        p[Measure::free_energy] =
+            shape.observed.energy + loads_at(c.law, 0).energy(shape.observed.area, shape.observed.volume, shape.length);
+    for (const axisym::ModeRates& mode : modes)
+        if (!mode.rates.empty()) p[Measure::growth] = std::fmax(p[Measure::growth], mode.rates.front());
+    const EndShape end{tube, p[Measure::r_min], p[Measure::r_max], p[Measure::area], p[Measure::volume]};
+    p.outcome = outcome_of_shape(shape, profile, end);
+    return p;
 }
 
 }  // namespace
@@ -174,12 +233,12 @@ int stop_word(Stop reason) {
     return static_cast<int>(reason);
 }
 
-PointResult run_point(const Problem& c, bool to_the_end, const std::function<bool()>& interrupted) {
+PointResult run_point(const Problem& c, bool to_the_end) {
     const PauseWatch watch(c.time.limit, interrupted);
     const double cpu = cpu_seconds();
     PointResult p;
     try {
-        p = c.equilibrium ? equilibrium_point(c, interrupted) : computed(c, to_the_end, interrupted);
+        p = c.equilibrium ? equilibrium_point(c) : computed(c, to_the_end);
     } catch (const Paused& pause) {
         const StopReport stop = paused_at_start(pause).stop;
         p = refused_point(stop.message);

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -61,16 +60,13 @@ struct PointResult {
 const std::vector<std::string>& stop_words();
 int stop_word(Stop reason);
 
-// Runs a case. `to_the_end`: even where the outcome is known before. A run that `interrupted` ends has
+// Runs a case. `to_the_end`: even where the outcome is known before. A run that interrupted() ends has
 // Stop::interrupted and no result; other failures are outcomes, never thrown.
-PointResult run_point(const Problem& c, bool to_the_end, const std::function<bool()>& interrupted);
+PointResult run_point(const Problem& c, bool to_the_end);
 
 // A point that was not run.
 PointResult unknown_point(std::size_t point);
 std::vector<PointResult> unknown_points(std::size_t count);  // of a grid, in order
-
-// The shape that a case with [equilibrium] finds. Throws as the search.
-PointResult equilibrium_point(const Problem& c, const std::function<bool()>& interrupted);
 
 // The result of a point whose keys are not a valid case.
 PointResult refused_point(const std::string& message);

@@ -8,11 +8,10 @@
 #include <limits>
 
 #include "common/case/read.hpp"
+#include "common/result/about.hpp"
 #include "common/result/checksums.hpp"
-#include "common/result/file_writer.hpp"
 #include "common/result/hdf5_objects.hpp"
 #include "tools/scan/extension.hpp"
-#include "tools/scan/theory.hpp"
 
 namespace tubule {
 
@@ -22,24 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Stored {
-    ScanResult result;
-    std::vector<ThresholdMap> thresholds;  // told at the end
-};
-
 // ---- writing HDF5
-
-void put_text(hid_t parent, const std::string& name, const std::string& text) {
-    const char* data = text.c_str();
-    put_dataset(parent, name, text_type(), scalar(), &data);
-}
-
-void put_texts(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
-               const std::vector<std::string>& texts) {
-    std::vector<const char*> data;
-    for (const std::string& text : texts) data.push_back(text.c_str());
-    put_dataset(parent, name, text_type(), space(shape), data.data());
-}
 
 void put_axis(hid_t parent, const std::string& name, const Axis& axis) {
     const auto group = make_group(parent, name);
@@ -53,14 +35,14 @@ void put_axis(hid_t parent, const std::string& name, const Axis& axis) {
             numbers.push_back(number_of(value).value_or(std::numeric_limits<double>::quiet_NaN()));
         }
     const std::vector<std::size_t> shape{axis.size(), axis.keys.size()};
-    put_texts(group, "texts", shape, texts);
-    put_dataset(group, "values", H5T_NATIVE_DOUBLE, space(shape), numbers.data());
+    put_dataset(group, "texts", texts, shape);
+    put_dataset(group, "values", numbers, shape);
 }
 
 // Integers whose meaning stands beside them.
 void put_named(hid_t parent, const std::string& name, const std::vector<std::size_t>& shape,
                const std::vector<std::int8_t>& values, const std::vector<std::string>& names) {
-    put_attribute(put_dataset(parent, name, H5T_NATIVE_INT8, space(shape), values.data()), "names", names);
+    put_attribute(put_dataset(parent, name, values, shape), "names", names);
 }
 
 void put_points(hid_t file, const ScanResult& result) {
@@ -78,9 +60,9 @@ void put_points(hid_t file, const ScanResult& result) {
     std::vector<double> column(result.points.size());
     for (std::size_t m = 0; m < n_measures; ++m) {
         for (std::size_t i = 0; i < column.size(); ++i) column[i] = result.points[i].measures[m];
-        put_dataset(group, measure_names[m], H5T_NATIVE_DOUBLE, space(shape), column.data());
+        put_dataset(group, measure_names[m], column, shape);
     }
-    put_texts(group, "message", shape, messages);
+    put_dataset(group, "message", messages, shape);
 }
 
 // Outcomes of the nodes of the grid: those of the least energy, if there are several starts.
@@ -97,7 +79,7 @@ void put_boundary(hid_t file, const ScanResult& result) {
     std::vector<std::int64_t> ends;
     for (const auto& [a, b] : boundary_edges(nodes.shape(), outcomes_of_nodes(result, nodes), around))
         for (const std::size_t node : {a, b}) ends.push_back(static_cast<std::int64_t>(nodes.point_of(node, 0)));
-    put_dataset(file, "boundary", H5T_NATIVE_INT64, space({ends.size() / 2, 2}), ends.data());
+    put_dataset(file, "boundary", ends, {ends.size() / 2, 2});
 }
 
 // Where on the edges of /boundary the outcome changes: between two values of what varies along each.
@@ -105,11 +87,11 @@ void put_crossings(hid_t file, const ScanResult& result) {
     const auto group = make_group(file, "between");
     std::vector<std::int64_t> numbers;
     std::vector<std::int8_t> outcomes;
-    for (const auto& [number, outcome] : result.between) {
+    for (const auto& [number, p] : result.more) {
         numbers.push_back(static_cast<std::int64_t>(number));
-        outcomes.push_back(static_cast<std::int8_t>(outcome));
+        outcomes.push_back(static_cast<std::int8_t>(p.outcome));
     }
-    put_dataset(group, "point", H5T_NATIVE_INT64, space({numbers.size()}), numbers.data());
+    put_dataset(group, "point", numbers);
     put_named(group, "outcome", {outcomes.size()}, outcomes, outcome_names());
     const ScanPlan whole = plan_of(result);
     const Plan& plan = whole.nodes();
@@ -122,7 +104,7 @@ void put_crossings(hid_t file, const ScanResult& result) {
             ends.push_back(result.scan.value(at));
         }
     }
-    put_dataset(file, "crossing", H5T_NATIVE_DOUBLE, space({ends.size() / 2, 2}), ends.data());
+    put_dataset(file, "crossing", ends, {ends.size() / 2, 2});
 }
 
 // Where energies of two kinds of shapes are equal: between two points (those of the first start), the value of what
@@ -132,7 +114,7 @@ void put_crossings_of_energy(hid_t file, const ScanResult& result) {
     std::vector<std::int64_t> numbers, ends, axes;
     std::vector<std::int8_t> kinds, lowest;
     std::vector<double> values, energies;
-    for (const auto& [number, p] : result.crossings) {
+    for (const auto& [number, p] : result.more) {
         const EnergyCrossing c = crossing_of(result.scan, number);
         numbers.push_back(static_cast<std::int64_t>(number));
         axes.push_back(static_cast<std::int64_t>(c.axis));
@@ -148,45 +130,29 @@ void put_crossings_of_energy(hid_t file, const ScanResult& result) {
         energies.push_back(p[Measure::energy]);
     }
     const auto group = make_group(file, "equal_energies");
-    const std::size_t n = numbers.size();
-    put_dataset(group, "number", H5T_NATIVE_INT64, space({n}), numbers.data());
-    put_dataset(group, "points", H5T_NATIVE_INT64, space({n, 2}), ends.data());
-    put_dataset(group, "axis", H5T_NATIVE_INT64, space({n}), axes.data());
-    put_named(group, "kinds", {n, 2}, kinds, outcome_names());
-    put_dataset(group, "lowest", H5T_NATIVE_INT8, space({n}), lowest.data());
-    put_dataset(group, "value", H5T_NATIVE_DOUBLE, space({n}), values.data());
-    put_dataset(group, "energy", H5T_NATIVE_DOUBLE, space({n}), energies.data());
-}
-
-std::map<std::size_t, PointResult> get_crossings_of_energy(hid_t file) {
-    const auto group = open_group(file, "equal_energies");
-    const auto numbers = get_integers(group, "number");
-    const auto values = get_array(group, "value").data, energies = get_array(group, "energy").data;
-    std::map<std::size_t, PointResult> out;
-    for (std::size_t i = 0; i < std::min({numbers.size(), values.size(), energies.size()}); ++i) {
-        PointResult p = unknown_point(static_cast<std::size_t>(numbers[i]));
-        p.value = values[i], p[Measure::energy] = energies[i];
-        p.outcome = std::isnan(p.value) ? Outcome::failed : Outcome::undecided;
-        out[p.point] = p;
-    }
-    return out;
+    put_dataset(group, "number", numbers);
+    put_dataset(group, "points", ends, {numbers.size(), 2});
+    put_dataset(group, "axis", axes);
+    put_named(group, "kinds", {numbers.size(), 2}, kinds, outcome_names());
+    put_dataset(group, "lowest", lowest);
+    put_dataset(group, "value", values);
+    put_dataset(group, "energy", energies);
 }
 
 void put_threshold(hid_t parent, const ThresholdMap& map) {
     const auto group = make_group(parent, map.name);
     put_attribute(group, "label", map.label);
-    put_dataset(group, "first", H5T_NATIVE_DOUBLE, space({map.first.size()}), map.first.data());
-    put_dataset(group, "second", H5T_NATIVE_DOUBLE, space({map.second.size()}), map.second.data());
-    put_dataset(group, "values", H5T_NATIVE_DOUBLE, space({map.first.size(), map.second.size()}), map.values.data());
+    put_dataset(group, "first", map.first);
+    put_dataset(group, "second", map.second);
+    put_dataset(group, "values", map.values, {map.first.size(), map.second.size()});
 }
 
-std::vector<std::byte> image_of(const Stored& stored) {
+std::vector<std::byte> image_of(const ScanResult& result, const std::vector<ThresholdMap>& thresholds) {
     const Quiet quiet;
-    const ScanResult& result = stored.result;
     const auto file = make_image(std::max<std::size_t>(result.points.size() * 256, 1 << 16));
     const Scan& scan = result.scan;
     const auto what = make_group(file, "scan");
-    put_text(what, "text", scan.text);
+    put_dataset(what, "text", scan.text);
     put_attribute(what, "path", scan.path);
     put_attribute(what, "title", scan.title);
     put_attribute(what, "until", std::string(scan.to_the_end ? "end" : "decided"));
@@ -196,13 +162,12 @@ std::vector<std::byte> image_of(const Stored& stored) {
         put_attribute(what, "seeds", std::int64_t{scan.boundary->seeds});
         put_attribute(what, "refine", std::int64_t{scan.boundary->refine});
     }
-    put_text(file, "case", scan.case_text);
-    put_inputs(file, scan.inputs);
     {
-        const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
+        const auto text = put_dataset(file, "case", scan.case_text);
         put_attribute(text, "path", scan.case_path);
         put_attribute(text, "set", scan.sets);
     }
+    put_inputs(file, scan.inputs);
     const auto about = make_group(file, "about");
     for (const auto& [key, value] : result.about)
         std::visit([&, &key = key](const auto& v) { put_attribute(about, key, v); }, value);
@@ -216,7 +181,7 @@ std::vector<std::byte> image_of(const Stored& stored) {
         put_crossings_of_energy(file, result);
     }
     const auto lines = make_group(file, "thresholds");
-    for (const ThresholdMap& map : stored.thresholds) put_threshold(lines, map);
+    for (const ThresholdMap& map : thresholds) put_threshold(lines, map);
     auto bytes = bytes_of(file);
     seal(bytes);
     return bytes;
@@ -224,31 +189,11 @@ std::vector<std::byte> image_of(const Stored& stored) {
 
 // ---- reading HDF5
 
-std::vector<std::string> get_text_array(hid_t parent, const std::string& name) {
-    const Handle dataset(H5Dopen2(parent, name.c_str(), H5P_DEFAULT), H5Dclose, "open dataset", name);
-    const Handle extent(H5Dget_space(dataset), H5Sclose, "read", name);
-    const Handle type = text_type();
-    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
-    require(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data.data()) >= 0, "read", name);
-    std::vector<std::string> texts;
-    for (const char* text : data) texts.emplace_back(text ? text : "");
-    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
-    return texts;
-}
-
-std::string get_text(hid_t object, const std::string& name) {
-    return get_texts(open_attribute(object, name), name).at(0);
-}
-
-std::uint64_t get_count(hid_t object, const std::string& name) {
-    return get_attribute<std::uint64_t>(open_attribute(object, name), H5T_NATIVE_UINT64, name);
-}
-
 Axis get_axis(hid_t parent, const std::string& name) {
     const auto group = open_group(parent, name);
     Axis axis;
-    axis.keys = get_texts(open_attribute(group, "keys"), "keys");
-    axis.logarithmic = get_count(group, "logarithmic") != 0;
+    axis.keys = get_texts(group, "keys");
+    axis.logarithmic = get_number<std::int64_t>(group, "logarithmic") != 0;
     const auto texts = get_text_array(group, "texts");
     for (std::size_t i = 0; i + axis.keys.size() <= texts.size(); i += axis.keys.size())
         axis.values.emplace_back(texts.begin() + static_cast<std::ptrdiff_t>(i),
@@ -259,20 +204,20 @@ Axis get_axis(hid_t parent, const std::string& name) {
 Scan get_scan(hid_t file) {
     Scan scan;
     const auto what = open_group(file, "scan");
-    scan.text = get_text_array(what, "text").at(0);
+    scan.text = get_text_dataset(what, "text");
     scan.path = get_text(what, "path");
     scan.title = get_text(what, "title");
     scan.to_the_end = get_text(what, "until") == "end";
     if (H5Aexists(what, "boundary") > 0) {
         scan.boundary.emplace();
         scan.boundary->around = outcome_from_name(get_text(what, "boundary"));
-        scan.boundary->seeds = static_cast<int>(get_count(what, "seeds"));
-        scan.boundary->refine = static_cast<int>(get_count(what, "refine"));
+        scan.boundary->seeds = static_cast<int>(get_number<std::int64_t>(what, "seeds"));
+        scan.boundary->refine = static_cast<int>(get_number<std::int64_t>(what, "refine"));
     }
-    scan.case_text = get_text_array(file, "case").at(0);
+    scan.case_text = get_text_dataset(file, "case");
     const Handle text(H5Dopen2(file, "case", H5P_DEFAULT), H5Dclose, "open", "case");
     scan.case_path = get_text(text, "path");
-    scan.sets = get_texts(open_attribute(text, "set"), "set");
+    scan.sets = get_texts(text, "set");
     scan.inputs = get_inputs(file);
     const auto axes = open_group(file, "axes");
     for (const std::string& axis : member_names(axes)) scan.axes.push_back(get_axis(axes, axis));
@@ -302,40 +247,42 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
     return points;
 }
 
-std::map<std::size_t, Outcome> get_between(hid_t file) {
-    const auto group = open_group(file, "between");
-    const auto numbers = get_integers(group, "point"), outcomes = get_integers(group, "outcome");
-    std::map<std::size_t, Outcome> between;
-    for (std::size_t i = 0; i < std::min(numbers.size(), outcomes.size()); ++i)
-        between[static_cast<std::size_t>(numbers[i])] = static_cast<Outcome>(outcomes[i]);
-    return between;
+// Of points between those of the grid only the outcome is kept, of crossings only value and energy.
+std::map<std::size_t, PointResult> get_more(hid_t file) {
+    std::map<std::size_t, PointResult> out;
+    const bool crossings = has(file, "equal_energies");
+    if (!crossings && !has(file, "between")) return out;
+    const auto group = open_group(file, crossings ? "equal_energies" : "between");
+    const auto numbers = get_integers(group, crossings ? "number" : "point");
+    const auto first = get_array(group, crossings ? "value" : "outcome").data,
+               energies = crossings ? get_array(group, "energy").data : first;
+    for (std::size_t i = 0; i < std::min({numbers.size(), first.size(), energies.size()}); ++i) {
+        PointResult p = unknown_point(static_cast<std::size_t>(numbers[i]));
+        if (crossings) {
+            p.value = first[i], p[Measure::energy] = energies[i];
+            p.outcome = std::isnan(p.value) ? Outcome::failed : Outcome::undecided;
+        } else {
+            p.outcome = static_cast<Outcome>(first[i]);
+        }
+        out[p.point] = p;
+    }
+    return out;
 }
 
-Stored read_file(const fs::path& path) {
+ScanResult read_file(const fs::path& path) {
     const Quiet quiet;
     const auto file = open_file(path);
     if (!has(file, "scan") || !has(file, "points")) throw std::runtime_error("not a scan of tubule: it has no /scan");
-    Stored stored;
-    stored.result.scan = get_scan(file);
+    ScanResult result;
+    result.scan = get_scan(file);
     const auto about = open_group(file, "about");
-    for (const std::string& key : attribute_names(about))
-        stored.result.about.emplace_back(key, get_value(open_attribute(about, key), key));
-    stored.result.points = get_points(file, stored.result.scan.size());
-    if (has(file, "equal_energies")) stored.result.crossings = get_crossings_of_energy(file);
-    if (has(file, "between")) stored.result.between = get_between(file);
-    return stored;
+    for (const std::string& key : attribute_names(about)) result.about.emplace_back(key, get_value(about, key));
+    result.points = get_points(file, result.scan.size());
+    result.more = get_more(file);
+    return result;
 }
 
-void keep(ScanResult& result, const PointResult& p) {
-    if (p.point < result.points.size())
-        result.points[p.point] = p;
-    else if (result.scan.boundary && result.scan.boundary->refine > 0)
-        result.between[p.point] = p.outcome;
-    else
-        result.crossings[p.point] = p;
-}
-
-Stored load(const fs::path& path) {
+ScanResult load(const fs::path& path) {
     try {
         return read_file(path);
     } catch (const std::exception& error) {
@@ -384,116 +331,78 @@ std::vector<Outcome> ScanResult::outcomes() const {
     return all;
 }
 
+const PointResult* ScanResult::known(std::size_t number) const {
+    if (number < points.size()) return points[number].outcome == Outcome::not_run ? nullptr : &points[number];
+    const auto found = more.find(number);
+    return found == more.end() ? nullptr : &found->second;
+}
+
 ScanPlan plan_of(const ScanResult& result) {
     ScanPlan plan(result.scan);
     for (const PointResult& p : result.points)
         if (p.outcome != Outcome::not_run) plan.done(p);
-    for (const auto& [number, outcome] : result.between) {
-        PointResult p = unknown_point(number);
-        p.outcome = outcome;
-        plan.done(p);
-    }
-    for (const auto& [number, crossing] : result.crossings) plan.done(crossing);
+    for (const auto& [number, p] : result.more) plan.done(p);
     return plan;
 }
 
-struct ScanWriter::Impl {
-    explicit Impl(const fs::path& path) : file(path) {}
-    // A scan that ended by an exception; if the disk is the reason, nothing more can be done.
-    ~Impl() {
-        try {
-            if (unwritten) write();
-        } catch (const std::exception&) {
-        }
+ScanWriter::ScanWriter(const fs::path& path, ScanResult result) : file_(path), result_(std::move(result)) {}
+
+// Of a scan that ended by an exception; if the disk is the reason, nothing more can be done.
+ScanWriter::~ScanWriter() {
+    try {
+        if (unwritten_) write();
+    } catch (const std::exception&) {
     }
+}
 
-    FileWriter file;
-    Stored stored;
-    bool complete = false;
-    bool began = false;      // the file is this writer's
-    bool unwritten = false;  // it lacks a point
+void ScanWriter::write(const std::vector<ThresholdMap>& thresholds) {
+    file_.write([&] { return image_of(result_, thresholds); });
+    began_ = true;
+    unwritten_ = false;
+}
 
-    void write() {
-        file.write([this] { return image_of(stored); });
-        began = true;
-        unwritten = false;
-    }
-};
-
-ScanWriter::ScanWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-ScanWriter::ScanWriter(ScanWriter&&) noexcept = default;
-ScanWriter::~ScanWriter() = default;
-
-ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const About& about) {
+ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const About& about,
+                              std::vector<PointResult> known) {
     const auto path = fs::weakly_canonical(file);
     if (fs::exists(path) && !is_scan(path))
         throw std::runtime_error(
             fmt::format("{}: is not a scan\nit was not replaced, since it may be needed: remove it first, or choose "
                         "another file with -o",
                         path.string()));
-    auto impl = std::make_unique<Impl>(path);
-    ScanResult& result = impl->stored.result;
-    result.scan = scan;
-    result.about = about;
-    result.points = unknown_points(scan.size());
-    return ScanWriter(std::move(impl));
-}
-
-ScanWriter ScanWriter::extend(const fs::path& file, const ScanResult& known, const About& about) {
-    ScanWriter writer = create(file, known.scan, about);
-    writer.impl_->stored.result.points = known.points;
-    return writer;
+    return {path, {scan, about, known.empty() ? unknown_points(scan.size()) : std::move(known), {}}};
 }
 
 ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
     const auto path = fs::weakly_canonical(file);
     refuse_old_journal(path);
-    auto impl = std::make_unique<Impl>(path);
-    impl->stored = load(path);
-    add_inputs(impl->stored.result.scan);
-    if (!same_scan(impl->stored.result.scan, scan))
+    ScanResult result = load(path);
+    add_inputs(result.scan);
+    if (!same_scan(result.scan, scan))
         throw CaseError(
             fmt::format("{}: cannot be resumed with {}: it belongs to another scan, case, --set or --over; "
                         "--extend --over adds values to a result, -o names another one, --overwrite replaces it",
                         file.string(), scan.path));
-    for (const auto& [key, value] : impl->stored.result.about)
-        if (key == "stop") impl->complete = std::get<std::string>(value) == "finished";
-    if (!impl->complete)
-        std::erase_if(impl->stored.result.about, [](const auto& entry) { return entry.first == "stop"; });
-    return ScanWriter(std::move(impl));
-}
-
-const ScanResult& ScanWriter::result() const {
-    return impl_->stored.result;
+    std::erase_if(result.about,
+                  [](const auto& entry) { return entry.first == "stop" && entry.second != Value("finished"); });
+    return {path, std::move(result)};
 }
 
 bool ScanWriter::complete() const {
-    return impl_->complete;
-}
-
-bool ScanWriter::began() const {
-    return impl_->began;
+    const auto* stop = find_value<std::string>(result_.about, "stop");
+    return stop && *stop == "finished";
 }
 
 void ScanWriter::point(const PointResult& p) {
-    keep(impl_->stored.result, p);
-    impl_->unwritten = true;
-    if (!impl_->began || impl_->file.due()) impl_->write();
+    (p.point < result_.points.size() ? result_.points[p.point] : result_.more[p.point]) = p;
+    unwritten_ = true;
+    if (!began_ || file_.due()) write();
 }
 
 void ScanWriter::finish(const About& more) {
-    About& about = impl_->stored.result.about;
-    for (const auto& [key, value] : more) {
-        const auto same = std::find_if(about.begin(), about.end(), [&](const auto& old) { return old.first == key; });
-        if (same != about.end())
-            same->second = value;
-        else
-            about.emplace_back(key, value);
-    }
-    drop_unwanted(impl_->stored.result);
-    impl_->stored.thresholds = threshold_maps(impl_->stored.result.scan);
-    impl_->write();
-    impl_->file.release();
+    update(result_.about, more);
+    drop_unwanted(result_);
+    write(threshold_maps(result_.scan));
+    file_.release();
 }
 
 bool is_scan(const fs::path& file) {
@@ -508,7 +417,7 @@ bool is_scan(const fs::path& file) {
 
 ScanResult read_scan_result(const fs::path& file) {
     warn_of_old_journal(file);
-    return load(file).result;
+    return load(file);
 }
 
 }  // namespace tubule

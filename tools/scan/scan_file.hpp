@@ -4,25 +4,27 @@
 
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <vector>
 
+#include "common/result/file_writer.hpp"
 #include "common/result/result.hpp"
 #include "tools/scan/description.hpp"
 #include "tools/scan/point.hpp"
-#include "tools/scan/scan_plan.hpp"
+#include "tools/scan/starts.hpp"
+#include "tools/scan/theory.hpp"
 
 namespace tubule {
 
 struct ScanResult {
     Scan scan;
     About about;
-    std::vector<PointResult> points;         // of the whole grid, in order; Outcome::not_run where nothing is known
-    std::map<std::size_t, Outcome> between;  // of points between those of the grid
-    std::map<std::size_t, PointResult> crossings;  // where energies are equal
+    std::vector<PointResult> points;          // of the whole grid, in order; Outcome::not_run where nothing is known
+    std::map<std::size_t, PointResult> more;  // by number: between points of the grid, or where energies are equal
 
     std::vector<std::size_t> shape() const;
     std::vector<Outcome> outcomes() const;
+    // A point of the grid or one of `more`, if it is known.
+    const PointResult* known(std::size_t number) const;
 };
 
 // Its plan, with all that is known. The result must stay.
@@ -32,26 +34,29 @@ ScanPlan plan_of(const ScanResult& result);
 // that name that is no scan.
 class ScanWriter {
 public:
-    // Begins anew; an old scan of that name is replaced at the first point.
-    static ScanWriter create(const std::filesystem::path& file, const Scan& scan, const About& about);
-    // Begins with points that are known: replaces whatever scan is there, the one that they come from included.
-    static ScanWriter extend(const std::filesystem::path& file, const ScanResult& known, const About& about);
+    // Begins anew, with the points of the grid that are known, if any: replaces whatever scan is there at the first
+    // point that is added.
+    static ScanWriter create(const std::filesystem::path& file, const Scan& scan, const About& about,
+                             std::vector<PointResult> known = {});
     // Goes on with the points of an unfinished scan. Throws CaseError if the file belongs to another one.
     static ScanWriter resume(const std::filesystem::path& file, const Scan& scan);
-    ScanWriter(ScanWriter&&) noexcept;
     ~ScanWriter();
 
-    const ScanResult& result() const;
-    bool complete() const;  // of a resumed scan: nothing is left to do
-    bool began() const;     // there was a point, and the file is this writer's
+    const ScanResult& result() const { return result_; }
+    bool complete() const;                 // of a resumed scan: nothing is left to do
+    bool began() const { return began_; }  // there was a point, and the file is this writer's
     void point(const PointResult& p);
     // Writes the file. What `more` says replaces what /about said by the same names.
     void finish(const About& more);
 
 private:
-    struct Impl;
-    explicit ScanWriter(std::unique_ptr<Impl>);
-    std::unique_ptr<Impl> impl_;
+    ScanWriter(const std::filesystem::path& path, ScanResult result);
+    void write(const std::vector<ThresholdMap>& thresholds = {});
+
+    FileWriter file_;
+    ScanResult result_;
+    bool began_ = false;
+    bool unwritten_ = false;  // the file lacks a point
 };
 
 // Whether the file is an HDF5 file with a scan in it. Never throws.

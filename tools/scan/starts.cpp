@@ -160,12 +160,11 @@ std::vector<EnergyCrossing> energy_crossings(const Nodes& nodes, const std::vect
 namespace {
 
 // The shape of a point of the grid, with another value of the key.
-PointResult shape_at(const Scan& scan, std::size_t point, const std::string& key, double value,
-                     const std::function<bool()>& interrupted) {
+PointResult shape_at(const Scan& scan, std::size_t point, const std::string& key, double value) {
     std::vector<std::string> sets = scan.sets_of(point);
     for (std::string& set : sets)
         if (set.starts_with(key + "=")) set = fmt::format("{}={}", key, value);
-    return run_point(scan.case_with(sets), scan.to_the_end, interrupted);
+    return run_point(scan.case_with(sets), scan.to_the_end);
 }
 
 double known_to(const PointResult& p) {
@@ -174,7 +173,7 @@ double known_to(const PointResult& p) {
 
 }  // namespace
 
-PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing, const std::function<bool()>& interrupted) {
+PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing) {
     constexpr int most = 40;
     const Nodes nodes(scan);
     const Axis& axis = scan.axes[crossing.axis];
@@ -192,8 +191,7 @@ PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing, cons
         const double part = (low * at_high - high * at_low) / (at_high - at_low), value = axis.value(at, part);
         std::array<PointResult, 2> shapes;
         for (const std::size_t i : {0, 1}) {
-            found = shapes[i] =
-                shape_at(scan, nodes.point_of(crossing.node, crossing.starts[i]), key, value, interrupted);
+            found = shapes[i] = shape_at(scan, nodes.point_of(crossing.node, crossing.starts[i]), key, value);
             cpu += found[Measure::cpu_seconds], wall += found[Measure::wall_seconds];
             if (found.outcome == crossing.kinds[i]) continue;
             found.outcome = Outcome::failed;
@@ -210,6 +208,63 @@ PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing, cons
         side = below ? 1 : -1;
     }
     return result();
+}
+namespace {
+
+Plan plan_on(const std::vector<std::size_t>& shape, const std::optional<BoundaryChoice>& boundary) {
+    return boundary ? Plan(shape, boundary->seeds, boundary->around, boundary->refine) : Plan(shape);
+}
+
+}  // namespace
+
+ScanPlan::ScanPlan(const Scan& scan) : scan_(scan), nodes_(scan), plan_(plan_on(nodes_.shape(), scan.boundary)) {
+    if (!nodes_.has_starts()) return;
+    points_ = unknown_points(scan.size());
+}
+
+std::size_t ScanPlan::wanted() const {
+    return plan_.wanted() * nodes_.starts() + asked_crossings_.size();
+}
+
+std::optional<Work> ScanPlan::next() {
+    while (true) {
+        while (!pending_.empty()) {
+            const std::size_t point = pending_.front();
+            pending_.pop_front();
+            if (points_[point].outcome == Outcome::not_run) return Work{point, {}};
+        }
+        const auto node = plan_.next();
+        if (!node) break;
+        if (!nodes_.has_starts()) return Work{*node, {}};
+        for (std::size_t s = 0; s < nodes_.starts(); ++s) pending_.push_back(nodes_.point_of(*node, s));
+    }
+    while (!crossings_.empty()) {
+        const EnergyCrossing crossing = crossings_.front();
+        crossings_.pop_front();
+        const std::size_t number = number_of(scan_, crossing);
+        if (!known_crossings_.contains(number)) return Work{number, crossing};
+    }
+    return std::nullopt;
+}
+
+void ScanPlan::done(const PointResult& result) {
+    ++known_;
+    if (!nodes_.has_starts()) return plan_.done(result.point, result.outcome);
+    if (result.point >= points_.size()) {
+        known_crossings_.insert(result.point);
+        return;
+    }
+    points_[result.point] = result;
+    node_done(nodes_.node_of(result.point));
+}
+
+// If it is, now that one of its points is known.
+void ScanPlan::node_done(std::size_t node) {
+    for (std::size_t s = 0; s < nodes_.starts(); ++s)
+        if (points_[nodes_.point_of(node, s)].outcome == Outcome::not_run) return;
+    plan_.done(node, points_[nodes_.point_of(node, best_start(nodes_, node, points_))].outcome);
+    for (const EnergyCrossing& crossing : energy_crossings(nodes_, points_, node))
+        if (asked_crossings_.insert(number_of(scan_, crossing)).second) crossings_.push_back(crossing);
 }
 
 }  // namespace tubule

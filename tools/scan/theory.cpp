@@ -146,6 +146,18 @@ std::optional<double> sphere_in_sphere(const Problem& c) {
     return spheres_with_neck(c, 1);
 }
 
+struct Threshold {
+    const char *name, *label;
+    std::optional<double> (*value)(const Problem& c);  // empty where it does not apply to the case
+};
+constexpr Threshold thresholds[]{{"longest_unduloid", "longest unduloid, L|H\u2080| = 2\u03c0", longest_unduloid},
+                                 {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
+                                 {"pearling", "straight tube, m = 0 neutral", waves_around<0>},
+                                 {"buckling", "straight tube, m = 1 neutral", waves_around<1>},
+                                 {"ovalisation", "straight tube, m = 2 neutral", waves_around<2>},
+                                 {"two_spheres", "two spheres with a neck", two_spheres},
+                                 {"sphere_in_sphere", "sphere in a sphere", sphere_in_sphere}};
+
 // Every value of a short axis, some of a long one.
 Axis some_of(const Axis& axis) {
     Axis some = axis;
@@ -254,18 +266,6 @@ bool divisible(const Scan& scan, std::size_t axis) {
 
 }  // namespace
 
-const std::vector<Threshold>& thresholds() {
-    static const std::vector<Threshold> all{
-        {"longest_unduloid", "longest unduloid, L|H\u2080| = 2\u03c0", longest_unduloid},
-        {"shortest_unduloid", "shortest unduloid, L|H\u2080| = 4", shortest_unduloid},
-        {"pearling", "straight tube, m = 0 neutral", waves_around<0>},
-        {"buckling", "straight tube, m = 1 neutral", waves_around<1>},
-        {"ovalisation", "straight tube, m = 2 neutral", waves_around<2>},
-        {"two_spheres", "two spheres with a neck", two_spheres},
-        {"sphere_in_sphere", "sphere in a sphere", sphere_in_sphere}};
-    return all;
-}
-
 std::vector<ThresholdMap> threshold_maps(const Scan& scan) {
     std::vector<std::size_t> axes;  // that of starts changes no threshold
     {
@@ -276,7 +276,7 @@ std::vector<ThresholdMap> threshold_maps(const Scan& scan) {
     if (axes.size() != 2 || scan.axes[axes[0]].keys.size() != 1 || scan.axes[axes[1]].keys.size() != 1) return {};
     Grid grid{scan, {axes[0], axes[1]}, {}};
     for (const std::size_t a : axes) grid.scan.axes[a] = some_of(scan.axes[a]);
-    for (const Threshold& threshold : thresholds()) grid.kinds.push_back(&threshold);
+    for (const Threshold& threshold : thresholds) grid.kinds.push_back(&threshold);
     grid.values.resize(grid.kinds.size());
     const Nodes nodes(grid.scan);
     for (std::size_t node = 0; node < grid.size(0) * grid.size(1); ++node) {

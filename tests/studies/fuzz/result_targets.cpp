@@ -45,8 +45,8 @@ Contents sample() {
     Contents c;
     c.case_text = {"tier = \"axisym\"\n", {"energy.k20=1"}};
     c.about = {{"version", std::string("0")}, {"seed", std::int64_t{3}}, {"stop_time", 0.5}};
-    c.series = {"time", "energy"};
-    c.rows = {0, 2, 0.5, 1};
+    c.series_names = {"time", "energy"};
+    c.series = {{"time", {0, 0.5}}, {"energy", {2, 1}}};
     c.meshes = {{.order = 1, .nodes = 4, .cells = {0, 1, 2, 0, 2, 3}, .period = 0, .shifts = {}}};
     const Record graph{0,
                        {{"degree", 1}, {"length", 2}},

@@ -1,8 +1,11 @@
-// One point of a scan in three dimensions: its case, and what its result says of the outcome in tier 1.
+// Points of a scan in three dimensions: which are worth it, their cases, and whether the results of both tiers say the
+// same.
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,9 +14,12 @@
 #include "common/result/result.hpp"
 #include "common/theory/dispersion.hpp"
 #include "common/theory/growth_fit.hpp"
+#include "tools/scan/outcome.hpp"
 #include "tools/scan/point.hpp"
 
 namespace tubule::confirm {
+
+// ---- motions
 
 struct Choices {
     std::optional<int> elements;  // about how many triangles; 200 for motions
@@ -61,5 +67,46 @@ struct SurfaceEnd {
 
 // Throws std::runtime_error if the result is incomplete.
 SurfaceEnd surface_end(const PointResult& axisymmetric, const Result& surface);
+
+// ---- equilibria
+
+// The case alone in tier axisym, with growth rates for m up to 4, as TOML text.
+std::string profile_case(const Problem& c);
+
+// In tier surface3d, as TOML text: the same quantities held, from the result of profile_case() at this path, with the
+// 12 slowest modes; on about this many triangles, or as many as an error of the energy of 1e-4 needs. Throws CaseError
+// where this tier refuses the case.
+std::string lifted_case(const Problem& c, const Result& profile, const std::string& path, std::optional<int> elements);
+
+struct EquilibriumEnd {
+    Verdict verdict = Verdict::no_answer;
+    std::string axisym_stop, stop;
+    double axisym_energy = not_known, energy = not_known;
+    double energy_difference = not_known, energy_error = not_known;  // relative to E_ref; that stated by both together
+    std::set<int> axisym_growing, growing;                           // wave numbers m of growing modes
+    int m = -1;  // of the mode in three dimensions that grows fastest or decays slowest; -1: none
+    double axisym_rate = not_known, rate = not_known;  // of gradient flow in 3D, by model.kind in tier axisym
+};
+
+// no_answer where one of them is no equilibrium; other_outcome where the energies differ by more than three times what
+// both state, or the growing modes have other m; symmetry_broken where they agree on a growing mode with m >= 1. Rates
+// below a thousandth of the fastest decay are neither. Throws std::runtime_error for incomplete results.
+EquilibriumEnd equilibrium_end(const Result& profile, const Result& surface);
+
+// ---- which points
+
+enum class Why { boundary, extreme, random };
+std::string_view name(Why why);
+
+struct Pick {
+    std::size_t point = 0;
+    Why why = Why::random;
+};
+
+// At most `count` points that were run and did not fail, of a grid of this shape: half of them both sides of lines
+// between outcomes (pairs of outcomes that are not there yet first, then far from those that are), a quarter corners of
+// the grid, the rest at random. If one kind has too few, the next gets more. The same seed picks the same points.
+std::vector<Pick> pick_points(const std::vector<std::size_t>& shape, const std::vector<Outcome>& outcomes,
+                              std::optional<Outcome> around, std::size_t count, unsigned seed);
 
 }  // namespace tubule::confirm

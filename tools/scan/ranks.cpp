@@ -1,35 +1,53 @@
 // The one place that sees MPI.
-#define OMPI_SKIP_MPICXX 1  // the C interface only
-#define MPICH_SKIP_MPICXX 1
-#include <mpi.h>
+#include "tools/scan/ranks.hpp"
 
-#include <chrono>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
-#include "tools/scan/ranks.hpp"
+
+#if TUBULE_HAS_MPI
+#define OMPI_SKIP_MPICXX 1  // the C interface only
+#define MPICH_SKIP_MPICXX 1
+#include <mpi.h>
+#endif
 
 namespace tubule {
+
+void work_off(Tasks& tasks, const Compute& compute) {
+    try {
+        for (Packet task; tasks.take(task, true) == NextTask::ready;) tasks.give(compute(task));
+    } catch (...) {
+        tasks.fail(std::current_exception());
+    }
+}
+
+#if TUBULE_HAS_MPI
 namespace {
 
-// A worker sends `result` (empty at first) and gets `work`, or `over`.
+using Bytes = std::vector<std::uint8_t>;
+
+// A worker sends `result` (null at first) and gets `work`, or `over`.
 enum Tag { result_tag = 1, work_tag, over_tag };
 
 constexpr auto poll = std::chrono::microseconds(50);
 
-void send(const Packet& bytes, int to, Tag tag) {
+void send(const Packet& packet, int to, Tag tag) {
+    const Bytes bytes = Packet::to_msgpack(packet);
     MPI_Send(bytes.data(), static_cast<int>(bytes.size()), MPI_CHAR, to, tag, MPI_COMM_WORLD);
 }
 
 Packet receive(const MPI_Status& announced) {
     int size = 0;
     MPI_Get_count(&announced, MPI_CHAR, &size);
-    Packet bytes(static_cast<std::size_t>(size));
+    Bytes bytes(static_cast<std::size_t>(size));
     MPI_Recv(bytes.data(), size, MPI_CHAR, announced.MPI_SOURCE, announced.MPI_TAG, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-    return bytes;
+    return Packet::from_msgpack(bytes);
 }
 
 // Sleeps between looks: MPI's own waiting keeps a core busy that another rank could use.
@@ -42,11 +60,14 @@ MPI_Status await_message(int from) {
     }
 }
 
-void broadcast(Packet& bytes) {
+// From rank 0 to the others.
+Packet broadcast(const Packet& packet) {
+    Bytes bytes = Packet::to_msgpack(packet);
     long size = static_cast<long>(bytes.size());
     MPI_Bcast(&size, 1, MPI_LONG, 0, MPI_COMM_WORLD);
     bytes.resize(static_cast<std::size_t>(size));
     MPI_Bcast(bytes.data(), static_cast<int>(size), MPI_CHAR, 0, MPI_COMM_WORLD);
+    return Packet::from_msgpack(bytes);
 }
 
 bool started_by_mpirun() {
@@ -81,20 +102,12 @@ void Ranks::abort(int status) {
 }
 
 void Ranks::dismiss() {
-    Packet nothing;
-    broadcast(nothing);
+    broadcast({});
 }
 
-int Ranks::run(RankTasks& tasks, const Packet& header, const Compute& compute) {
-    Packet sent = header;
-    broadcast(sent);
-    std::thread here([&] {
-        try {
-            for (Packet task; tasks.take(task, true) == NextTask::ready;) tasks.give(compute(task));
-        } catch (...) {
-            tasks.fail(std::current_exception());
-        }
-    });
+int Ranks::run(Tasks& tasks, const Packet& header, const Compute& compute) {
+    broadcast(header);
+    std::thread here([&] { work_off(tasks, compute); });
     std::vector<int> idle;
     for (int working = count_ - 1; working > 0;) {
         // After an interrupt nobody is waited for: their tasks will be done again, and the caller ends them.
@@ -104,8 +117,8 @@ int Ranks::run(RankTasks& tasks, const Packet& header, const Compute& compute) {
         int there = 0;
         MPI_Iprobe(MPI_ANY_SOURCE, result_tag, MPI_COMM_WORLD, &there, &status);
         if (there) {
-            const Packet bytes = receive(status);
-            if (!bytes.empty()) tasks.give(bytes);
+            const Packet result = receive(status);
+            if (!result.is_null()) tasks.give(result);
             idle.push_back(status.MPI_SOURCE);
             quiet = false;
         }
@@ -129,9 +142,8 @@ int Ranks::run(RankTasks& tasks, const Packet& header, const Compute& compute) {
 }
 
 void Ranks::serve(const std::function<Compute(const Packet& header)>& begin) {
-    Packet header;
-    broadcast(header);
-    if (header.empty()) return;
+    const Packet header = broadcast({});
+    if (header.is_null()) return;
     const Compute compute = begin(header);
     for (Packet answer;;) {
         send(answer, 0, result_tag);
@@ -141,5 +153,29 @@ void Ranks::serve(const std::function<Compute(const Packet& header)>& begin) {
         answer = compute(task);
     }
 }
+
+#else  // there are never any
+
+std::optional<Ranks> Ranks::join() {
+    for (const char* variable : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"})
+        if (const char* size = std::getenv(variable); size && std::string(size) != "1")
+            throw CaseError(
+                "this build cannot share work among the processes of an mpirun: install libopenmpi-dev and "
+                "openmpi-bin, "
+                "then run cmake --preset release && cmake --build --preset release; or run it without mpirun");
+    return std::nullopt;
+}
+Ranks::Ranks(Ranks&&) noexcept = default;
+Ranks::~Ranks() = default;
+int Ranks::run(Tasks&, const Packet&, const Compute&) {
+    return 0;
+}
+void Ranks::dismiss() {}
+void Ranks::serve(const std::function<Compute(const Packet&)>&) {}
+void Ranks::abort(int status) {
+    std::exit(status);
+}
+
+#endif
 
 }  // namespace tubule
