@@ -297,8 +297,7 @@ void require_result(const std::filesystem::path& file) {
 }
 
 std::vector<std::byte> result_image(const Result& result) {
-    Contents contents{result};
-    contents.about_begun = result.about.size();
+    Contents contents{result, result.about.size(), {}};
     contents.case_text.resolved = resolved_case(result.case_text);
     return hdf5_image(contents);
 }
