@@ -265,7 +265,7 @@ class EnergiesTest(ProgramTest):
         self.assertGreater(np.ptp(rows["energy_61"]), 0)
 
     def test_pictures_have_their_labels(self):
-        self.run_case(case(term(0.01, 2, 1), term(0.3, formula="H^2")))
+        self.run_case(case(term(0.01, 2, 1), term(0.3, formula="H^2")), "--set", "time.end=0.1")
         picture = self.folder / "picture.svg"
         self.tubule("plot", self.result, "--kind=energy", "-o", picture)
         self.assertIn("k\u2084\u2081(H\u2212H\u2080)\u00b2K", picture.read_text())

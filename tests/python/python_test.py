@@ -519,7 +519,7 @@ class Notebooks(Folder):
         result = tubule.run(TUBE)
         tubule.film(result, self.folder / "a.gif")
         self.assertEqual((self.folder / "a.gif").read_bytes()[:4], b"GIF8")
-        for output, options, error, words in (("a.gif", {"colour": "Q"}, ValueError, "not one of u_n"), ("a.avi", {}, ValueError, "one of .mp4, .gif")):
+        for output, options, error, words in (("a.gif", {"colour": "Q"}, ValueError, "not one of H"), ("a.avi", {}, ValueError, "one of .mp4, .gif")):
             with self.assertRaisesRegex(error, words):
                 tubule.film(result, self.folder / output, **options)
         with self.assertRaisesRegex(TypeError, "a result is wanted"):
