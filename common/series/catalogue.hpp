@@ -76,6 +76,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"branch", "1", "0 of the first branch, then the number of one that bifurcates from it"},
     {"negative_directions", "1", "number of directions in which the energy falls"},
     {"rate_<i>", "1/time", "growth rate of the <i>-th slowest mode"},
+    {"rate_error_<i>", "1/time", "estimated error of rate_<i>; -1 if unknown"},
     {"wave_number_<i>", "1", "azimuthal wave number m of mode <i> about the axis of the shape; -1 if there is no axis"},
     {"growth_<m>", "1/time", "growth rate of modes with the azimuthal wave number m = <m>"},
     {"meridian_length", "length", "length of the profile"},

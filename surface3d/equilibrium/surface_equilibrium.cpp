@@ -59,6 +59,7 @@ public:
                 given ? settings_.triangles : static_cast<int>(refinement * std::max(triangles, out_.mesh.triangles()));
             if (enough || triangles > settings_.max_triangles || (!found && !given && rounds_ == most_attempts))
                 return found ? finish(system, u) : end(out_.stop, why_none(system, u));
+            if (found) remember(system, u);
         }
     }
 
@@ -87,28 +88,41 @@ private:
         out_.values = system.values(u);
         out_.reference_energy = reference_energy(problem_, system, u);
         out_.held_motions = system.held_motions();
-        const double energy =
-            out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume, system.length(u));
         multipliers_ = u.tail(u.size() - system.shape_size());
         if (out_.stop != Stop::finished) {
             before_.reset(), out_.estimated_error = 1;
             return;
         }
         if (before_) {
-            // Energies converge as h^(2k-2) where meshes are alike; these are not: half of that.
-            const double fall =
-                std::pow(static_cast<double>(before_->second) / out_.mesh.triangles(), (out_.mesh.order - 1) / 2.0);
             // What the edges carry is no larger than the error of the next coarser mesh.
-            out_.estimated_error =
-                std::max(std::abs(energy - before_->first) * fall / (1 - std::min(fall, 0.5)), out_.values.kinks) /
-                out_.reference_energy;
+            const double apart = error_since(Eigen::VectorXd::Constant(1, before_->energy),
+                                             Eigen::VectorXd::Constant(1, energy_of(system, u)))[0];
+            out_.estimated_error = std::max(apart, out_.values.kinks) / out_.reference_energy;
         }
-        before_ = {energy, out_.mesh.triangles()};
+    }
+
+    double energy_of(const SurfaceSystem& system, const Eigen::VectorXd& u) const {
+        return out_.values.energy + problem_.loads.energy(out_.values.area, out_.values.volume, system.length(u));
+    }
+
+    Eigen::VectorXd error_since(const Eigen::VectorXd& before, const Eigen::VectorXd& now) const {
+        return errors_between(before, before_->triangles, now, out_.mesh.triangles(), out_.mesh.order);
+    }
+
+    // What the next mesh is compared with.
+    void remember(const SurfaceSystem& system, const Eigen::VectorXd& u) {
+        before_ = {energy_of(system, u), out_.mesh.triangles(), {}};
+        if (settings_.modes > 0) try {
+                before_->eigenvalues = system.spectrum(u, settings_.modes).values;
+            } catch (const SolveError&) {  // the errors remain unknown
+            }
     }
 
     SurfaceEquilibrium finish(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         try {
             out_.spectrum = system.spectrum(u, std::max(settings_.modes, 1));
+            if (before_ && before_->eigenvalues.size() == out_.spectrum.values.size())
+                out_.spectrum.errors = error_since(before_->eigenvalues, out_.spectrum.values);
             out_.wave_numbers = system.wave_numbers(u, out_.spectrum.vectors.topRows(out_.mesh.size()));
         } catch (const SolveError& error) {
             return end(Stop::solver_failed, fmt::format("the second variation: {}", error.what()));
@@ -150,7 +164,12 @@ private:
     Extents first_{};
     int rounds_ = 0;
     Eigen::VectorXd multipliers_;
-    std::optional<std::pair<double, int>> before_;  // energy and triangles of the mesh before
+    struct Before {
+        double energy;
+        int triangles;
+        Eigen::VectorXd eigenvalues;
+    };
+    std::optional<Before> before_;  // on the mesh before
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ struct SurfaceEquilibriumSettings {
     int max_triangles = 20000;  // more are never taken
     bool descend = true;        // look for a minimum; if not, for a stationary shape near the initial one
     bool near = false;          // the initial shape is an equilibrium of a nearby problem, or of the other tier
-    int modes = 1;              // lowest eigenvalues of the second variation
+    int modes = 0;              // lowest eigenvalues of the second variation with errors; one without is always found
 };
 
 struct SurfaceEquilibrium {

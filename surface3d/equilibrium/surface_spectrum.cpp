@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "common/solve/bordered_ldlt.hpp"
@@ -99,6 +100,12 @@ struct Mass {
 };
 
 }  // namespace
+
+Eigen::VectorXd errors_between(const Eigen::VectorXd& coarse, int coarse_triangles, const Eigen::VectorXd& fine,
+                               int fine_triangles, int order) {
+    const double fall = std::pow(static_cast<double>(coarse_triangles) / fine_triangles, (order - 1) / 2.0);
+    return (coarse - fine).cwiseAbs() * fall / (1 - std::min(fall, 0.5));
+}
 
 int count_below(const ConstrainedForm& A, const Ordering& ordering, double shift) {
     return Shifted(A, ordering, shift).negative();

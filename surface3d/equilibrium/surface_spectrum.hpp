@@ -21,6 +21,7 @@ struct ConstrainedForm {
 struct SurfaceSpectrum {
     Eigen::VectorXd values;   // ascending
     Eigen::MatrixXd vectors;  // one column each, of norm 1 in M
+    Eigen::VectorXd errors;   // estimated, of the values; empty without a coarser mesh to compare with
     int negative = 0;         // eigenvalues below 0, counted by the inertia of the form
     // Empty, or why eigenvalues and inertia do not agree: a value may be missing.
     std::string doubt;
@@ -29,6 +30,11 @@ struct SurfaceSpectrum {
 // The `count` lowest. `scale`: a size of eigenvalues, from which the search for a lower bound begins. SolveError if no
 // shift can be factored, or Lanczos' method does not converge.
 SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ordering, int count, double scale);
+
+// Estimated errors of quantities that converge as the energy of triangles of this order, of which these are the values
+// on two meshes: half the order is counted on, since meshes are not alike.
+Eigen::VectorXd errors_between(const Eigen::VectorXd& coarse, int coarse_triangles, const Eigen::VectorXd& fine,
+                               int fine_triangles, int order);
 
 // The number of eigenvalues below `shift`: Sylvester's law for the form with its constraints.
 int count_below(const ConstrainedForm& A, const Ordering& ordering, double shift);

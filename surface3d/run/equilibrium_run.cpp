@@ -44,7 +44,7 @@ Task task_of(const Problem& c, const Start& start) {
     s.descend = c.equilibrium->descend;
     s.first_triangles = std::max(s.first_triangles, triangles_for_places(c.energy.potentials, c.law.beads, v.area));
     s.near = std::holds_alternative<ResultFrame>(c.shape);
-    s.modes = c.equilibrium->rates.value_or(1);
+    s.modes = c.equilibrium->rates.value_or(0);
     if (!start.resizable())
         s.triangles = mesh.triangles();
     else
@@ -128,6 +128,10 @@ SeriesTable<ShapeRow> shape_series(const Problem& c) {
     table.add_family("rate_<i>", numbers, [](const ShapeRow& r, std::size_t i) {
         const Eigen::VectorXd& values = r.shape.spectrum.values;
         return static_cast<Eigen::Index>(i) < values.size() ? -values[i] : 0.0;
+    });
+    table.add_family("rate_error_<i>", numbers, [](const ShapeRow& r, std::size_t i) {
+        const Eigen::VectorXd& errors = r.shape.spectrum.errors;
+        return static_cast<Eigen::Index>(i) < errors.size() ? errors[i] : -1.0;
     });
     table.add_family("wave_number_<i>", numbers, [](const ShapeRow& r, std::size_t i) {
         return i < r.shape.wave_numbers.size() ? r.shape.wave_numbers[i] : -1.0;

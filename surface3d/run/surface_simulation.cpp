@@ -9,6 +9,7 @@
 #include "common/run/energy_checks.hpp"
 #include "common/run/stall.hpp"
 #include "common/solve/memory.hpp"
+#include "common/solve/pause.hpp"
 #include "surface3d/meshing/remesh.hpp"
 #include "surface3d/meshing/transfer.hpp"
 #include "surface3d/run/guards.hpp"
@@ -146,6 +147,7 @@ double SurfaceSimulation::initial_dissipation() const {
             before = extrapolated, of_step = of_longer;
         }
     } catch (const SolveError&) {  // the first step says why
+    } catch (const Paused&) {      // once there is a state to save
     }
     return best;
 }

@@ -76,6 +76,7 @@ void refuse_motion(const std::string& why);  // of a shape that is asked about a
 struct SlowMode {
     double rate;
     int m;
+    double error = -1;  // estimated; -1: unknown
 };
 // Rows of a table of them.
 std::string words_of_modes(const std::vector<SlowMode>& modes, const std::optional<Scales>& scales);

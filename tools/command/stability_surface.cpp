@@ -59,7 +59,8 @@ SurfaceModes modes_of(const Problem& c) {
     for (std::size_t i = 0; i < names.size(); ++i) out.values[names[i]] = keep.last[i];
     for (int i = 1; i <= *c.equilibrium->rates; ++i)
         out.modes.push_back({out.values.at(fmt::format("rate_{}", i)),
-                             static_cast<int>(out.values.at(fmt::format("wave_number_{}", i)))});
+                             static_cast<int>(out.values.at(fmt::format("wave_number_{}", i))),
+                             out.values.at(fmt::format("rate_error_{}", i))});
     return out;
 }
 
@@ -79,7 +80,7 @@ std::string words_of(const SurfaceModes& found, const std::optional<Scales>& sca
 
 std::string csv_of_modes(Json modes) {
     for (std::size_t i = 0; i < modes.size(); ++i) modes[i]["model"] = "gradient-flow", modes[i]["number"] = i + 1;
-    return csv_of({"model", "number", "m", "rate"}, modes);
+    return csv_of({"model", "number", "m", "rate", "rate_error"}, modes);
 }
 
 std::string json_text(const SurfaceModes& found, const Json& modes) {
@@ -95,12 +96,14 @@ std::string json_text(const SurfaceModes& found, const Json& modes) {
 
 std::string words_of_modes(const std::vector<SlowMode>& modes, const std::optional<Scales>& scales) {
     const LabUnit rates = lab_unit(scales, "1/time"), times = lab_unit(scales, "time");
-    std::string out = "    number    m           rate    e-fold in\n";
+    const bool errors = !modes.empty() && modes.front().error >= 0;
+    std::string out = fmt::format("    number    m           rate    e-fold in{}\n", errors ? "     error" : "");
     if (scales) add(out, "    {:>6} {:>4} {:>14} {:>12}\n", "", "", rates.name, times.name);
     for (std::size_t i = 0; i < modes.size(); ++i) {
-        const auto& [rate, m] = modes[i];
-        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}\n", i + 1, m < 0 ? "-" : std::to_string(m), rate * rates.scale,
-            times.scale / std::abs(rate), rate > 0 ? "  grows" : "");
+        const auto& [rate, m, error] = modes[i];
+        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}{}\n", i + 1, m < 0 ? "-" : std::to_string(m),
+            rate * rates.scale, times.scale / std::abs(rate),
+            errors ? fmt::format(" {:>9.1e}", error * rates.scale) : "", rate > 0 ? "  grows" : "");
     }
     return out;
 }
@@ -119,7 +122,7 @@ std::string surface_report(const StabilityOptions& options, const StabilitySubje
     const SurfaceModes found = modes_of(problem_of(options, subject));
     if (!options.csv && !options.json) return words_of(found, known_scales(subject.c));
     Json modes = Json::array();
-    for (const auto& [rate, m] : found.modes) modes.push_back({{"m", m}, {"rate", rate}});
+    for (const auto& [rate, m, error] : found.modes) modes.push_back({{"m", m}, {"rate", rate}, {"rate_error", error}});
     return options.csv ? csv_of_modes(modes) : json_text(found, modes);
 }
 
