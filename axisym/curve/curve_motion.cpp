@@ -59,7 +59,8 @@ std::array<S, n_rows> point_law(const PointFields<S>& f, const CurveLaw& law, co
             push_z = pushed ? law.source.force_at(2, place) : S(0.0);
     if (!law.inextensible && law.lagrangian) {
         const S dS = (2 * pi) * (r * (g2 * ig));
-        out[kr] = dS * (f.r_t - push_r), out[kz] = dS * (f.z_t - push_z);
+        const S across = (push_r * z_s - push_z * r_s) * ig2;  // along the membrane nothing moves points
+        out[kr] = dS * (f.r_t - across * z_s), out[kz] = dS * (f.z_t + across * r_s);
         return out;
     }
     if (!law.inextensible) {

@@ -32,7 +32,7 @@ struct Scales {
     std::string time_from;  // the key that fixes it
 };
 
-// Of a case with [units]. Throws CaseError where the quantities contradict the case.
+// The units of a case with [units]. Throws CaseError where the quantities contradict the case.
 Scales scales_of(const Case& c);
 // The same; none without [units].
 std::optional<Scales> known_scales(const Case& c);

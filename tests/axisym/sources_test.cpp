@@ -46,6 +46,16 @@ TEST(Sources, PushAGradientFlow) {
     EXPECT_LT(std::abs(tube.last("identity_defect")), 1e-4);
 }
 
+// In gradient flow a force along the membrane moves nothing, nor the points that carry H0.
+TEST(Sources, LeaveH0WhereItIs) {
+    const std::string tube =
+        "[energy]\nk20 = 1\nH0 = \"-1 + 0.2*sin(2*pi*z/3)\"\n[shape]\nkind = \"tube\"\nradius = 1\n"
+        "length = 3\n[time]\nend = 0.01\n[accuracy]\nenergy = 1e-5\n";
+    const Outcome free = run_text(tube), pushed = run_text(tube + "[model.source]\nforce_z = \"20*sin(2*pi*z/3)\"\n");
+    // Where the tube is no longer straight the force has a small normal part.
+    EXPECT_NEAR(pushed.last("energy"), free.last("energy"), 0.02 * (free["energy"].front() - free.last("energy")));
+}
+
 TEST(Sources, HaveThePeriodOfATube) {
     try {
         run_text(

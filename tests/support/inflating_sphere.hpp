@@ -44,7 +44,7 @@ struct InflatingSphere {
         const std::string R2 = "(1.2-0.2*cos(2*t))^2", a = "(0.4*sin(2*t)/(1.2-0.2*cos(2*t)))", c = "sin(t)",
                           a_t = "((0.8*cos(2*t)-0.4*sin(2*t)*" + a + ")/(1.2-0.2*cos(2*t)))";
         const double rho = inertia, mu = flows;
-        // Of x: inertia, viscosity, friction; and -b/R, theory.md (3.23).
+        // Factors of x: inertia, viscosity, friction; and -b/R, theory.md (3.23).
         const std::string normal = fmt::format("({0}*({1}+{2}^2)+{3}*{2}/{4}+{5}*{2})", rho, a_t, a, 4 * mu, R2, gamma);
         const std::string bending = fmt::format("({})*(2/(1.2-0.2*cos(2*t))+({}))/{}", 2 * k20 * H0, H0, R2);
         const int degree = flow == Flow::shear ? 2 : 3;

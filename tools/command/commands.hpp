@@ -72,7 +72,7 @@ struct CompareOptions {
     bool align = false, no_shapes = false, csv = false, json = false;
 };
 
-// Of results that are at hand, the answer as JSON, docs/schemas/compare.json. Throws std::invalid_argument for what
+// Compares results in memory; the answer is JSON, docs/schemas/compare.json. Throws std::invalid_argument for what
 // cannot be compared.
 std::string comparison_json(const CompareOptions& options, const Result& a, const Result& b);
 

@@ -75,7 +75,7 @@ struct Shown {
     bool numbered = false;
 };
 
-// Of a series, or of a number of a frame or about the run.
+// The unit in which a series, a number of a frame or one about the run is shown.
 LabUnit unit_of(const Shown& in, const std::string& name) {
     if (name == "length") return lab_unit(in.scales, "length");  // the period of a frame
     if (name == "E_ref") return lab_unit(in.scales, "energy");

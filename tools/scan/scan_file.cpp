@@ -247,7 +247,7 @@ std::vector<PointResult> get_points(hid_t file, std::size_t count) {
     return points;
 }
 
-// Of points between those of the grid only the outcome is kept, of crossings only value and energy.
+// Points between those of the grid keep only the outcome, crossings only value and energy.
 std::map<std::size_t, PointResult> get_more(hid_t file) {
     std::map<std::size_t, PointResult> out;
     const bool crossings = has(file, "equal_energies");
@@ -347,7 +347,7 @@ ScanPlan plan_of(const ScanResult& result) {
 
 ScanWriter::ScanWriter(const fs::path& path, ScanResult result) : file_(path), result_(std::move(result)) {}
 
-// Of a scan that ended by an exception; if the disk is the reason, nothing more can be done.
+// Closes the file of a scan that ended by an exception; if the disk is the reason, nothing more can be done.
 ScanWriter::~ScanWriter() {
     try {
         if (unwritten_) write();

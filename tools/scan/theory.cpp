@@ -188,7 +188,7 @@ struct Grid {
 
     std::size_t size(std::size_t side) const { return scan.axes[axes[side]].size(); }
 
-    // Of all thresholds at a node; NaN where one does not apply or there is no case.
+    // The values of all thresholds at a node; NaN where one does not apply or there is no case.
     std::vector<double> exact(const Nodes& nodes, std::size_t node) const {
         std::vector<double> found(kinds.size(), std::numeric_limits<double>::quiet_NaN());
         try {

@@ -27,7 +27,7 @@ from curves import MODES, Profiles, at_rest, tube_stiffness  # noqa: E402
 from shape_equations import capsule  # noqa: E402
 
 PROGRAM, FOLDER = sys.argv[1], Path(__file__).resolve().parents[3] / "docs/reference"
-# Of the program's differences, relative. Those of tori are errors of meshes.
+# Relative differences of the program. Those of tori are errors of meshes.
 TOLERANCES = {"tubes": 1e-12, "thresholds": 1e-9, "cells": 1e-8, "vesicles": 2e-8, "tori": 5e-4}
 AREA = 4 * np.pi
 V = [round(v / 100, 2) for v in range(95, 44, -5)]
