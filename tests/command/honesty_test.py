@@ -164,11 +164,6 @@ class Honesty(ProgramTest):
             self.assertLessEqual(error, end["estimated_error"])
             self.assertLessEqual(end["estimated_error"], end["asked_accuracy"])
 
-    def test_runs_that_fail_at_once_know_no_error(self):
-        end, _ = self.run_case(CAPSULE, "accuracy.energy=1e-8", "energy.k40=0.02", "time.limit=8", statuses=(0, 4, 5))
-        if end["stop"] not in ("finished", "time-limit"):  # on a busy machine
-            self.assertEqual(end["estimated_error"], 1)
-
     def test_the_seam_of_a_capsule_at_the_start(self):
         exact = 20 * math.pi  # theory.md (7.8) with H0 = 0: INT H^2 = 2 pi l/r + 16 pi
         for asked in (1e-2, 1e-4, 1e-6):
@@ -181,7 +176,7 @@ class Honesty(ProgramTest):
         tiers = (("axisym", "gradient-flow"), ("axisym", "overdamped"), ("surface3d", "gradient-flow"))
         for tier, model in tiers:
             with self.subTest(tier=tier, model=model):
-                text = CANCELLING.replace("axisym", tier).replace("0.02", "0.02" if tier == "axisym" else "0.002")
+                text = CANCELLING.replace("axisym", tier).replace("0.02", "0.02" if tier == "axisym" else "1e-4")
                 end, rows = self.run_case(text, f"model.kind={model}")
                 plain, _ = self.run_case(text, f"model.kind={model}", "accuracy.relative_to=magnitude")
                 self.assertAlmostEqual(end["E_ref"] / abs(rows["energy"][0]), 1, delta=1e-3)  # of a first mesh

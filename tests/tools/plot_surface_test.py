@@ -132,7 +132,7 @@ class Surfaces(InFolder):
         cls.torus, cls.sphere, cls.tube = (cls.made / f"shapes_{name}.hdf" for name in ("torus", "sphere", "tube"))
 
     def test_one_surface_twice_side_by_side(self):
-        texts = self.drawn(self.torus)
+        texts = self.drawn(self.torus, "-o", self.folder / "p.png")
         self.check_words(texts, "A torus", BAR, "Gaussian curvature K", never=["bending energy E"])  # one row
         picture = matplotlib.image.imread(self.folder / "p.png")[..., :3]
         red, green, blue = np.moveaxis(picture, -1, 0)

@@ -149,14 +149,13 @@ class InFolder(unittest.TestCase):
         said = [line for line in done.stderr.splitlines(True) if "has no checksums" not in line]
         return subprocess.CompletedProcess(done.args, done.returncode, done.stdout, "".join(said))
 
-    def drawn(self, *arguments, dpi=60, **options):
-        """Lines of text of the SVG drawn; the PNG beside it must be of the page's width and not blank."""
-        done = self.plot(*arguments, f"--dpi={dpi}", "-o", self.folder / "p.png", "-o", self.folder / "p.svg", **options)
+    def drawn(self, *arguments, **options):
+        """Lines of text of the SVG drawn, which must be of the page's width."""
+        done = self.plot(*arguments, "--dpi=60", "-o", self.folder / "p.svg", **options)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        width, height = png_size(self.folder / "p.png")
-        self.assertEqual(width, 7 * dpi)  # the page's width in inches
-        self.assertGreater(height, dpi)
-        self.assertGreater((self.folder / "p.png").stat().st_size, 50 * dpi)
+        width, height = (float(x) for x in re.search('width="(.*?)pt" height="(.*?)pt"', (self.folder / "p.svg").read_text()).groups())
+        self.assertEqual(width, 7 * 72)  # the page's width in points
+        self.assertGreater(height, 72)
         return svg_texts(self.folder / "p.svg")
 
     def check_words(self, texts, *words, never=()):
@@ -319,7 +318,10 @@ class Pictures(InFolder):
     def test_one_result_has_its_title_and_default_names(self):
         done = self.plot(self.write("one.hdf"))
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual(png_size(self.folder / "one.png")[0], 2100)
+        width, height = png_size(self.folder / "one.png")
+        self.assertEqual(width, 2100)
+        self.assertGreater(height, 300)
+        self.assertGreater((self.folder / "one.png").stat().st_size, 15000)  # not blank
         self.assertEqual(self.plot(self.folder / "one.hdf", "--width=3.4", "--dpi=100").returncode, 0)
         self.assertEqual(png_size(self.folder / "one.png")[0], 340)
         self.assertIn("A made-up tube", svg_texts(self.folder / "one.svg"))
@@ -698,11 +700,10 @@ class FiguresOfDocs(InFolder):
 class Command(InFolder):
     """`tubule plot` itself; in the suite only where the program is given."""
 
-    def test_labels_formulas_and_exit_status_come_through(self):
+    def test_labels_and_formulas_come_through(self):
         files = [self.write(f"{i}.hdf", k42=k42) for i, k42 in enumerate((0.06, 0.12))]
         texts = self.drawn("--times", "0,0.2", *files, program=TUBULE)
         self.check_words(texts, "k\u2084\u2082 = 0.06", "k\u2084\u2082K\u00b2", "t\u2081 = 0.2")
-        self.refused("no result has a frame", files[0], "--times", "7", program=TUBULE)
 
 
 def load_tests(loader, suite, pattern):
