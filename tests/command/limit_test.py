@@ -102,7 +102,7 @@ class TimeLimit(ProgramTest):
 
 
 class CtrlC(ProgramTest):
-    def computing(self, *arguments, seconds=0.3, **options):
+    def computing(self, *arguments, seconds=0.1, **options):
         """A process that has used so many seconds of processor time."""
         process, stat = self.start(*arguments, **options), lambda: Path(f"/proc/{process.pid}/stat").read_text()
         self.wait(process, lambda: int(stat().rsplit(")")[1].split()[11]) / os.sysconf("SC_CLK_TCK") > seconds)
@@ -134,11 +134,11 @@ class CtrlC(ProgramTest):
     def test_in_values_that_extend_a_scan(self):
         case = self.write("scanned.toml", QUICK)
         self.tubule("scan", case, "--over", "energy.k20=0.5,0.6", "-o", "scan.hdf", "--quiet")
-        self.ends_when_interrupted("scan", "scan.hdf", "--extend", "--over", "energy.k20=1:2:500000", seconds=1)
+        self.ends_when_interrupted("scan", "scan.hdf", "--extend", "--over", "energy.k20=1:2:500000", seconds=0.4)
 
     def test_one_that_is_ignored_from_the_beginning_stays_ignored(self):
         # As a shell does for background jobs of a script.
-        with self.computing("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=1", seconds=0.1,
+        with self.computing("run", self.write("pancake.toml", PANCAKE), "--set", "time.limit=1",
                             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as process:  # fmt: skip
             process.send_signal(signal.SIGINT)
             out, err = process.communicate()

@@ -516,7 +516,7 @@ class Notebooks(Folder):
         self.assertEqual(scan._repr_html_().count("<tr>"), 3)
 
     def test_films(self):
-        result = tubule.run(TUBE)
+        result = tubule.run(TUBE | {"time": {"end": 0.2}})  # two frames
         tubule.film(result, self.folder / "a.gif")
         self.assertEqual((self.folder / "a.gif").read_bytes()[:4], b"GIF8")
         for output, options, error, words in (("a.gif", {"colour": "Q"}, ValueError, "not one of H"), ("a.avi", {}, ValueError, "one of .mp4, .gif")):
