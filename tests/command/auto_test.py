@@ -148,7 +148,7 @@ kind = "overdamped"
 [accuracy]
 energy = 1e-2
 [time]
-end = 0.01
+end = 1e-3
 """
         self.tubule("run", self.write("case.toml", case), "--quiet", "-o", self.result)
         return about(self.result)
@@ -174,7 +174,7 @@ model = {kind = "gradient-flow", area = "fixed", volume = "fixed"}
 shape = {kind = "ellipsoid", a = 1.0, b = 1.0, c = 0.5}
 auto = {noise = 3e-3}
 accuracy = {energy = 1e-2, estimate = false}
-discretisation = {elements = 320, order = 2}
+discretisation = {elements = 180, order = 2}
 time = {end = 0.1167}
 """
         result = self.folder / "wall.hdf"

@@ -140,7 +140,7 @@ class EnergiesTest(ProgramTest):
         flow = QUICK_SPHERE + "[time]\nend = 0.005\n[accuracy]\nenergy = {}\n"
         profile, _ = self.run_case(case(*terms, more=flow.format(1e-6)))
         surface, _ = self.run_case(
-            case(*terms, tier="surface3d", more=flow.format(1e-3) + "estimate = false\n[discretisation]\nelements = 180\n")
+            case(*terms, tier="surface3d", more=flow.format(1e-3) + "estimate = false\n[discretisation]\nelements = 80\n")
         )
         reference = about(self.result)["E_ref"]
         self.assertGreater(profile["energy"][0] - profile["energy"][-1], 1e-2 * reference)

@@ -30,7 +30,7 @@ kind = "overdamped"
 [discretisation]
 order = 2
 [time]
-end = 10.0
+end = 0.3
 limit = 60
 """
 
