@@ -180,15 +180,16 @@ time = {end = 10}
 )";
 
 TEST(Places, Guards) {
-    const Outcome passed = run_case(inflated, {"discretisation.elements=320", "accuracy.estimate=false"});
+    const Outcome passed = run_case(inflated, {"energy.potential.0.range=0.3", "accuracy.estimate=false"});
     EXPECT_EQ(passed.summary.stop.reason, Stop::undefined) << passed.summary.stop.message;
     EXPECT_CONTAINS(passed.summary.stop.message, "behind the wall of a potential");
     const Outcome coarse =
         run_case(inflated, {"energy.potential.0.range=0.06", "energy.potential.0.z=-1.06", "accuracy.estimate=false"});
     EXPECT_EQ(coarse.summary.stop.reason, Stop::resolution_lost);
     EXPECT_CONTAINS(coarse.summary.stop.message, "times the range of the wall there apart");
-    const Outcome undefined = run_case(
-        inflated, {"energy.potential=[{kind=\"formula\", formula=\"0.1*sqrt(z + 1.3)\"}]", "accuracy.estimate=false"});
+    const Outcome undefined =
+        run_case(inflated, {"energy.potential=[{kind=\"formula\", formula=\"0.1*sqrt(z + 1.3)\"}]",
+                            "accuracy.estimate=false", "discretisation.order=2"});
     EXPECT_EQ(undefined.summary.stop.reason, Stop::undefined) << undefined.summary.stop.message;
     for (const double E : undefined.series("energy")) EXPECT_TRUE(std::isfinite(E));
     const Outcome bead = run_case(pulled, {"model.bead_width=0.05", "accuracy.estimate=false"});

@@ -596,7 +596,7 @@ class Refusals(InFolder):
         # A module of that name that cannot be imported, found before Debian's.
         (self.folder / "h5py.py").write_text("raise ImportError")
         path = {"PYTHONPATH": str(self.folder)}
-        done = subprocess.run([sys.executable, "-B", PLOT, "plot", "a.hdf"], env=os.environ | path, capture_output=True, text=True)
+        done = subprocess.run([sys.executable, "-B", PLOT, "plot", self.write()], env=os.environ | path, capture_output=True, text=True)
         self.assertEqual(done.returncode, 4)
         self.assertIn("has no h5py; install the package python3-h5py", done.stderr)
 

@@ -40,6 +40,9 @@ def prepared(script, lines):
     """The script's main(), with its arguments read and its modules imported."""
     with EndedByInterrupts():
         options = [lines.COMMANDS[script](sys.argv[1:])] if script in lines.COMMANDS else []
+        for one in options:  # before imports, which take a second
+            for path in getattr(one, "results", [one.result] if "result" in one else []):
+                lines.check_file(path)
         program = "tubule stability --plot" if script == "stability" else f"tubule {script}"
         lines.require_libraries(program)
         importlib.import_module("tubule_drawing.style").apply()

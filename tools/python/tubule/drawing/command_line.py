@@ -337,6 +337,30 @@ def status_of(work):
         return EXIT_INTERRUPTED
 
 
+def why_missing(path):
+    """What may have been meant by the name of a file that is not there."""
+    folder, name = os.path.split(path)
+    case = os.path.splitext(name)[0] + ".toml"
+    if path.startswith("~"):
+        return "; ~ does not stand for the home directory here: write the whole path"
+    if name.endswith(".hdf") and os.path.exists(os.path.join(folder, case)):
+        return f"; tubule run {case} makes it"
+    others = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
+    near = difflib.get_close_matches(name, [other for other in others if os.path.splitext(other)[1] == os.path.splitext(name)[1]], 1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def check_file(path):
+    """Raises BadInput if there is none of this name that could be a result."""
+    if not os.path.exists(path):
+        raise BadInput(f"{path}: no such file{why_missing(path)}")
+    if not os.path.isfile(path):
+        raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
+    if path.endswith(".toml"):
+        raise BadInput(f"{path}: is a case file, not a result: run it first (tubule run {path}; tubule scan for a scan), then give "
+                       f"its result, {os.path.basename(path)[:-5]}.hdf")  # fmt: skip
+
+
 def require_libraries(program):
     """Raises Unavailable, naming the package, if a library is missing. To be called before the imports that need them."""
     # A result file never changes in place, so it needs no lock; on some disks locks fail.

@@ -1,6 +1,5 @@
 """Reads result files into plain data. Layout: docs/results.md."""
 
-import difflib
 import json
 import os
 import re
@@ -12,7 +11,7 @@ from dataclasses import dataclass, field
 import h5py
 import numpy as np
 
-from .command_line import BadInput
+from .command_line import BadInput, check_file
 from .labels import as_label, flatten, pretty_unit
 from .triangles import join_periods
 
@@ -197,31 +196,12 @@ SCHEMA = 2  # common/result/hdf5_objects.hpp
 BEST_COMPRESSION = 1032  # of deflate
 
 
-def why_missing(path):
-    """What may have been meant by the name of a file that is not there."""
-    folder, name = os.path.split(path)
-    case = os.path.splitext(name)[0] + ".toml"
-    if path.startswith("~"):
-        return "; ~ does not stand for the home directory here: write the whole path"
-    if name.endswith(".hdf") and os.path.exists(os.path.join(folder, case)):
-        return f"; tubule run {case} makes it"
-    others = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
-    near = difflib.get_close_matches(name, [other for other in others if os.path.splitext(other)[1] == os.path.splitext(name)[1]], 1)
-    return f"; did you mean {near[0]}?" if near else ""
-
-
 @contextmanager
 def opened(path):
     """The HDF5 file, or one in memory. BadInput names it for all that is wrong with it, and for links to other files: what
     lies there may be anything, and anybody's."""
-    named = isinstance(path, str)
-    if named and not os.path.exists(path):
-        raise BadInput(f"{path}: no such file{why_missing(path)}")
-    if named and not os.path.isfile(path):
-        raise BadInput(f"{path}: is a directory, a pipe or a device, not a file")
-    if named and path.endswith(".toml"):
-        raise BadInput(f"{path}: is a case file, not a result: run it first (tubule run {path}; tubule scan for a scan), then give "
-                       f"its result, {os.path.basename(path)[:-5]}.hdf")  # fmt: skip
+    if isinstance(path, str):
+        check_file(path)
     try:
         file = h5py.File(path, "r")
     except OSError as error:
