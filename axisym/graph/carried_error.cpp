@@ -17,26 +17,7 @@ std::vector<double> halved(const std::vector<double>& breaks) {
 }  // namespace
 
 ErrorTransport::Level::Level(const Forms& f) : forms(f), matrix(f.pattern().nonZeros()), lu(f.pattern()) {
-    state = rate = middle = slope = residual = rest = driven = Eigen::VectorXd::Zero(f.space().size());
-}
-
-// The residual at (middle, slope) drives the error for this long.
-void ErrorTransport::Level::add(double weight) {
-    forms.residual(middle.data(), slope.data(), residual.data());
-    driven += weight * residual;
-}
-
-// M (e' - e)/dt + J e' = -(mean residual of the path). The difference of nonlinear residuals stands for J e.
-void ErrorTransport::Level::advance(double time, double sampled, Eigen::VectorXd& error) {
-    forms.jacobian(state.data(), rate.data(), 1 / time, matrix.data());
-    lu.factor(matrix.data());
-    forms.residual(state.data(), rate.data(), rest.data());
-    middle = state + error;
-    forms.residual(middle.data(), rate.data(), residual.data());
-    residual += (driven - sampled * rest) / time;
-    lu.solve(residual.data());
-    error -= residual;
-    driven.setZero();
+    state = rate = middle = slope = residual = driven = Eigen::VectorXd::Zero(f.space().size());
 }
 
 ErrorTransport::ErrorTransport(const Forms& coarse)
@@ -46,7 +27,9 @@ ErrorTransport::ErrorTransport(const Forms& coarse)
       fine_(fine_space_, coarse.bending(), coarse.loads()),
       prolongation_(fine_space_.prolongation(coarse.space())),
       on_fine_(fine_),
-      on_coarse_(coarse) {
+      on_coarse_(coarse),
+      stiffness_(coarse.pattern().nonZeros()),
+      mass_(coarse.pattern()) {
     total = Eigen::VectorXd::Zero(fine_space_.size());
     temporal = Eigen::VectorXd::Zero(coarse.space().size());
 }
@@ -67,18 +50,18 @@ void ErrorTransport::begin(const double* x, const double* v) {
     const int n = coarse_.space().size();
     on_coarse_.state = Eigen::Map<const Eigen::VectorXd>(x, n);
     on_coarse_.rate = Eigen::Map<const Eigen::VectorXd>(v, n);
-    on_coarse_.driven.setZero();
     on_fine_.driven.setZero();
     elapsed_ = sampled_ = 0;
+    linearised_ = false;
 }
 
-// That of the path at `middle` and `slope` of the coarse level.
+// That of the path at `middle` and `slope` of the coarse level drives the errors for this long.
 void ErrorTransport::add_residual(double weight) {
-    Level &c = on_coarse_, &f = on_fine_;
-    f.middle.noalias() = prolongation_ * c.middle;
-    f.slope.noalias() = prolongation_ * c.slope;
-    c.add(weight);
-    f.add(weight);
+    Level& f = on_fine_;
+    f.middle.noalias() = prolongation_ * on_coarse_.middle;
+    f.slope.noalias() = prolongation_ * on_coarse_.slope;
+    f.forms.residual(f.middle.data(), f.slope.data(), f.residual.data());
+    f.driven += weight * f.residual;
     sampled_ += weight;
 }
 
@@ -98,16 +81,51 @@ void ErrorTransport::add_step(const TimeIntegrator& flow, double from, bool rose
     }
     c.state = x;
     c.rate = v;
+    linearised_ = false;
     elapsed_ += h;
 }
 
 void ErrorTransport::advance() {
     if (elapsed_ == 0) return;
-    on_fine_.state.noalias() = prolongation_ * on_coarse_.state;
-    on_fine_.rate.noalias() = prolongation_ * on_coarse_.rate;
-    on_fine_.advance(elapsed_, sampled_, total);
-    on_coarse_.advance(elapsed_, sampled_, temporal);
+    Level &c = on_coarse_, &f = on_fine_;
+    f.state.noalias() = prolongation_ * c.state;
+    f.rate.noalias() = prolongation_ * c.rate;
+    f.forms.residual(f.state.data(), f.rate.data(), f.residual.data());
+    f.driven -= sampled_ * f.residual;
+    c.driven.noalias() = prolongation_.transpose() * f.driven;
+    advance_total();
+    advance_temporal();
+    f.driven.setZero();
     elapsed_ = sampled_ = 0;
+    linearised_ = true;
+}
+
+// M (e' - e)/dt + J e' = -(mean residual of the path). The difference of nonlinear residuals stands for J e.
+void ErrorTransport::advance_total() {
+    Level& f = on_fine_;
+    f.forms.jacobian(f.state.data(), f.rate.data(), 1 / elapsed_, f.matrix.data());
+    f.lu.factor(f.matrix.data());
+    f.middle = f.state + total;
+    f.forms.residual(f.middle.data(), f.rate.data(), f.residual.data());
+    f.residual += f.driven / elapsed_;
+    f.lu.solve(f.residual.data());
+    total -= f.residual;
+}
+
+// The same without that difference: this error is only compared.
+void ErrorTransport::advance_temporal() {
+    Level& c = on_coarse_;
+    c.forms.jacobian(c.state.data(), c.rate.data(), 0, stiffness_.data());
+    c.forms.mass(c.state.data(), mass_.valuePtr());
+    for (std::size_t i = 0; i < stiffness_.size(); ++i) c.matrix[i] = stiffness_[i] + mass_.valuePtr()[i] / elapsed_;
+    c.lu.factor(c.matrix.data());
+    temporal = (mass_ * temporal - c.driven) / elapsed_;
+    c.lu.solve(temporal.data());
+}
+
+const double* ErrorTransport::stiffness_at(const double* x) const {
+    const Eigen::VectorXd& last = on_coarse_.state;
+    return linearised_ && std::equal(last.begin(), last.end(), x) ? stiffness_.data() : nullptr;
 }
 
 ErrorTransport::EnergyError ErrorTransport::energy_error(double energy) const {

@@ -1,7 +1,7 @@
 // Estimates how far the computed profile is from the exact one. The error obeys the linearised flow, driven by the
 // residual of the flow along the path of the run in time, tested with splines on halved elements; the part that the
-// steps in time make is driven by the same residual tested with the splines of the run. Linearly implicit Euler steps
-// carry it along, each spanning some steps of the run.
+// steps in time make is driven by what that residual is more than at the end of a step, tested with the splines of the
+// run. Linearly implicit Euler steps carry it along, each spanning some steps of the run.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,6 +44,8 @@ public:
     void add_step(const TimeIntegrator& flow, double from, bool rosenbrock);
     // Brings the errors to the time of the last step.
     void advance();
+    // dF/dx of the run at x where the last advance() has it, else null.
+    const double* stiffness_at(const double* x) const;
 
     // Energy of the exact profile minus that of the computed one, `energy`, at the time of the last advance().
     struct EnergyError {
@@ -61,12 +63,15 @@ private:
         const Forms& forms;
         std::vector<double> matrix;
         BandLu lu;
-        Eigen::VectorXd state, rate, middle, slope, residual, rest, driven;
+        Eigen::VectorXd state, rate, middle, slope, residual, driven;
         explicit Level(const Forms& f);
-        void add(double weight);
-        void advance(double time, double sampled, Eigen::VectorXd& error);
     };
     Level on_fine_, on_coarse_;
+    void advance_total();
+    void advance_temporal();
+    std::vector<double> stiffness_;  // on the mesh of the run, like the mass
+    Eigen::SparseMatrix<double> mass_;
+    bool linearised_ = false;  // since the last step
     void add_residual(double weight);
     double elapsed_ = 0;
     double sampled_ = 0;  // weights of samples within steps; the rest of `elapsed_` has the residual of its end

@@ -40,6 +40,21 @@ Pack gather(const SplineSpace::Basis& b, const int* dofs, const double* x) {
     return value;
 }
 
+// The least of a quantity at the points of each lane, and where.
+struct Least {
+    Pack value{std::numeric_limits<double>::infinity()}, place{0.0};
+    void look(const Pack& v, const Pack& z) {
+        const auto less = v < value;
+        stdx::where(less, place) = z;
+        stdx::where(less, value) = v;
+    }
+    void find(double& least, double& where) const {
+        least = stdx::hmin(value);
+        for (int q = 0; q < lanes; ++q)
+            if (value[q] == least) where = place[q];
+    }
+};
+
 // The free energy per unit of z, with derivatives with respect to (r, r', r'').
 template <int Order, Added added>
 Jet<Pack, 3, Order> energy_density(const Bending& bending, const Loads& loads, const Pack& r, const Pack& r1,
@@ -221,13 +236,8 @@ void Forms::mass(const double* x, double* values) const {
     for_degree(space_.degree(), [&](auto P) { mass_kernel<P()>(x, values); });
 }
 
-double Forms::free_energy(const Eigen::VectorXd& x) const {
-    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
-    return observe(x.data(), rest.data()).free_energy;
-}
-
-template <int P>
-[[gnu::flatten]] double Forms::axial_force_kernel(const double* x) const {
+template <int P, class Integrand>
+[[gnu::flatten]] double Forms::integral_kernel(const double* x, const Integrand& integrand) const {
     const auto kernel = [&]<Added added>() -> double {
         Pack sum{0.0};
         for (int e = 0; e < space_.elements(); ++e)
@@ -236,16 +246,24 @@ template <int P>
                 const Local<P> at(basis, space_.dofs(e), x);
                 ProfilePoint<Jet<Pack, 3, 1>> p;
                 const auto f = energy_density<1, added>(bending_, loads_, at.r, at.r1, at.r2, p);
-                sum += load(basis.weight) * (f.v - at.r1 * f.d[1] - 2 * at.r2 * f.d[2]);
+                sum += load(basis.weight) * integrand(f, at);
             }
-        return images_ * stdx::reduce(sum) / space_.cell().period();
+        return images_ * stdx::reduce(sum);
     };
     return by_added(bending_, kernel);
 }
 
+double Forms::free_energy(const Eigen::VectorXd& x) const {
+    const auto density = [](const auto& f, const auto&) { return f.v; };
+    const double energy = for_degree(space_.degree(), [&](auto P) { return integral_kernel<P()>(x.data(), density); });
+    return gradients_ ? energy + bending_.kg * gradients_->value(x.data()) : energy;
+}
+
 double Forms::axial_force(const Eigen::VectorXd& x) const {
-    const double force = for_degree(space_.degree(), [&](auto P) { return axial_force_kernel<P()>(x.data()); });
-    return gradients_ ? force + bending_.kg * gradients_->stretch_slope(x.data()) / space_.cell().period() : force;
+    const auto slope = [](const auto& f, const auto& at) { return f.v - at.r1 * f.d[1] - 2 * at.r2 * f.d[2]; };
+    const double force = for_degree(space_.degree(), [&](auto P) { return integral_kernel<P()>(x.data(), slope); }),
+                 more = gradients_ ? bending_.kg * gradients_->stretch_slope(x.data()) : 0;
+    return (force + more) / space_.cell().period();
 }
 
 Eigen::VectorXd Forms::gradient(const Eigen::VectorXd& x) const {
@@ -278,8 +296,7 @@ template <int P>
 [[gnu::flatten]] Observation Forms::observe_kernel(const double* x, const double* v, double* stiffness) const {
     const auto kernel = [&]<Added added>() -> Observation {
         Observation o;
-        o.r_min = o.symbol = o.symbol_3d = std::numeric_limits<double>::infinity();
-        o.r_max = -o.r_min;
+        Least neck, belly, steepest, symbol, symbol_3d;
         Pack dissipation{0.0}, area{0.0}, volume{0.0}, listed[n_bending_terms];
         for (Pack& term : listed) term = Pack(0.0);
         std::vector<Pack> more(bending_.terms.size(), Pack(0.0));
@@ -300,24 +317,27 @@ template <int P>
                 const auto f = density<Pack, added>(bending_, p.H, p.K);
                 const Pack s = principal_symbol(f, p.kappa_theta), steep = stdx::abs(at.r1) / at.r;
                 const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-                if (!gradients_) o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
+                const Pack z = load(basis.z);
+                neck.look(at.r, z), belly.look(-at.r, z), steepest.look(-steep, z);
+                if (!gradients_) symbol.look(s, z), symbol_3d.look(least_principal_symbol(f, low, high), z);
                 if (stiffness) {
                     const Pack ig2 = p.inverse_speed * p.inverse_speed;
                     stiffness[e] += stdx::reduce(dA * ig2 * ig2 * ig2 * stdx::abs(s));
                 }
+                if (!gradients_) continue;
                 for (int q = 0; q < lanes; ++q) {
-                    if (at.r[q] < o.r_min) o.r_min = at.r[q], o.z_min = basis.z[q];
-                    if (at.r[q] > o.r_max) o.r_max = at.r[q], o.z_max = basis.z[q];
-                    if (steep[q] > o.steepness) o.steepness = steep[q], o.z_steep = basis.z[q];
-                    if (!gradients_ && s[q] < o.symbol) o.symbol = s[q], o.z_symbol = basis.z[q];
-                    if (!gradients_ || s[q] >= 0) continue;
+                    if (s[q] >= 0) continue;
                     const double size = (space_.breaks()[e + 1] - space_.breaks()[e]) / p.inverse_speed[q],
                                  coarse = size * std::sqrt(-s[q] / (2 * bending_.kg));
                     if (coarse > o.coarse) o.coarse = coarse, o.z_coarse = basis.z[q];
                 }
             }
         }
-        o.steepness *= o.r_min;
+        neck.find(o.r_min, o.z_min), belly.find(o.r_max, o.z_max), steepest.find(o.steepness, o.z_steep);
+        symbol.find(o.symbol, o.z_symbol);
+        o.symbol_3d = stdx::hmin(symbol_3d.value);
+        o.r_max = -o.r_max;
+        o.steepness *= -o.r_min;
         o.area = images_ * stdx::reduce(area);
         o.volume = images_ * stdx::reduce(volume);
         o.dissipation = images_ * stdx::reduce(dissipation);

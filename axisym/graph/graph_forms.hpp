@@ -85,8 +85,8 @@ private:
     FormulaDomain::Margin domain(const double* x) const;
     template <int P>
     Observation observe_kernel(const double* x, const double* v, double* stiffness) const;
-    template <int P>
-    double axial_force_kernel(const double* x) const;
+    template <int P, class Integrand>
+    double integral_kernel(const double* x, const Integrand& integrand) const;
 
     const SplineSpace& space_;
     Bending bending_;

@@ -48,8 +48,11 @@ ImplicitSystem GraphSimulation::system() {
     system.residual = [&forms](double, const double* at, const double* rate, double* out) {
         return forms.residual(at, rate, out);
     };
-    system.jacobian = [&forms](double, const double* at, const double* rate, double cj, double* values) {
-        forms.jacobian(at, rate, cj, values);
+    system.jacobian = [this, &forms](double, const double* at, const double* rate, double cj, double* values) {
+        if (const double* known = cj == 0 ? mesh_->transport.stiffness_at(at) : nullptr)
+            std::copy_n(known, forms.pattern().nonZeros(), values);
+        else
+            forms.jacobian(at, rate, cj, values);
     };
     system.pattern = &forms.pattern();
     system.banded = mesh_->space.cell().mirror;

@@ -24,6 +24,10 @@ public:
     }
 
 private:
+    template <class Width>
+    void eliminate(Width width);
+    template <int W>
+    void solve_straight(double* x) const;
     double& at(int i, int j) { return band_[static_cast<std::size_t>(j) * stride_ + above_ + i - j]; }
 
     const Eigen::SparseMatrix<double>& pattern_;
@@ -32,7 +36,8 @@ private:
     std::vector<int> place_;  // of each unknown in the order of elimination
     std::vector<double> band_, inverse_pivot_;
     std::vector<int> pivot_;
-    mutable std::vector<double> work_;
+    bool pivots_ = false;               // whether rows were exchanged
+    mutable std::vector<double> work_;  // with room beside the unknowns
 };
 
 }  // namespace tubule::axisym

@@ -177,11 +177,21 @@ void SplineSpace::splines(int element, double z, int derivatives, double* out) c
 }
 
 std::array<double, 3> SplineSpace::evaluate(const double* c, int element, double z) const {
-    double values[3 * max_width];
-    splines(element, z, 2, values);
+    // De Boor's triangle. Its last three coefficients, and then two, give the derivatives.
+    const Active& at = shared_->active[element];
+    const int p = at.p, *dof = dofs(element);
+    const double* sign = signs(element);
+    const double* t = at.knots;
+    double d[max_width];
+    for (int a = 0; a <= p; ++a) d[a] = sign[a] * c[dof[a]];
+    const auto slope = [&](int a, int span) { return (d[a] - d[a - 1]) * at.inverse_span[span][a]; };
     std::array<double, 3> out{};
-    for (int d = 0; d < 3; ++d)
-        for (int a = 0; a < width(); ++a) out[d] += values[d * width() + a] * signs(element)[a] * c[dofs(element)[a]];
+    for (int span = p; span > 0; --span) {
+        if (span == 2) out[2] = p * (p - 1) * (slope(p, 2) - slope(p - 1, 2)) * at.inverse_span[1][p];
+        if (span == 1) out[1] = p * slope(p, 1);
+        for (int a = p; a > p - span; --a) d[a] = d[a - 1] + (z - t[a]) * slope(a, span);
+    }
+    out[0] = d[p];
     return out;
 }
 

@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <span>
 
 #include "common/case/read.hpp"
@@ -17,6 +19,10 @@ namespace {
 // A value in TOML, or as a string if it is none, as a node whose source is the override; in a table, since a node lives
 // in one.
 toml::table parse_value(const std::string& text, const std::string& source) {
+    const auto begins = [&](std::string_view word) { return text.starts_with(word); };
+    constexpr std::array words{"true", "false", "inf", "nan"};
+    if (!text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) && !std::ranges::any_of(words, begins))
+        return parse_value(toml_string(text), source);
     const bool meant_as_toml = !text.empty() && std::string_view("[{\"'").find(text.front()) != std::string_view::npos;
     try {
         toml::table parsed = parse_toml("value = " + text, source);

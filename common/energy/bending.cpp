@@ -108,6 +108,7 @@ bool symbol_may_vanish(const Bending& bending) {
 }
 
 std::string unbounded_below(const Bending& bending) {
+    if (bending.terms.empty() && std::ranges::all_of(bending.k, [](double k) { return k >= 0; })) return {};
     constexpr double large = 1e11, larger = 1e12, falls = 1e-3;
     const double before = lowest(bending, large).first;
     const auto [after, angle] = lowest(bending, larger);
