@@ -9,18 +9,16 @@
 namespace tubule::surface3d {
 namespace {
 
-constexpr int most_columns = 2 * max_cell_nodes + 1;
-using Columns3 = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_columns>;
-using Columns6 = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, most_columns>;
-using Columns9 = Eigen::Matrix<double, 9, Eigen::Dynamic, 0, 9, most_columns>;
+constexpr int most_own = max_cell_nodes + 1, most_columns = 2 * max_cell_nodes + 1;  // of a triangle; of two
+template <int rows>
+using Rows = Eigen::Matrix<double, rows, Eigen::Dynamic, Eigen::RowMajor, rows, most_own>;
 using Row = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, most_columns>;
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_columns, most_columns>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector9 = Eigen::Matrix<double, 9, 1>;
-
-// Functions of the metric g11, g12, g22 and the second fundamental form b11, b12, b22.
-using Form = Jet<double, 6, 2>;
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
 template <int N>
 Eigen::Matrix<double, N, 1> gradient(const Jet<double, N, 2>& f) {
@@ -34,100 +32,171 @@ Eigen::Matrix<double, N, N> hessian(const Jet<double, N, 2>& f) {
     return out;
 }
 
+// Functions of four combinations of the metric and the second fundamental form: det g, b11 g22 - 2 b12 g12 + b22 g11,
+// det b and b11/g11.
+using Invariant = Jet<double, 4, 2>;
+template <class T>
 struct Curvatures {
-    Form area, H, K, g11, b11;
+    T area, H, K;
+    Curvatures(const T& det, const T& trace, const T& gauss) {
+        using std::sqrt;
+        const T inverse_det = inverse(det);
+        area = sqrt(det), H = trace * inverse_det, K = gauss * inverse_det;
+    }
 };
 
-// The tangents t, c = X_u, X_v and the second derivatives of a surface at a point, and how its normal and its two
-// fundamental forms change with them.
-struct Frame {
-    Eigen::Vector3d x, t, c, second[3], normal;
-    double area;
-    Eigen::Matrix<double, 3, 6> normal_slope;  // in (t, c)
-    Eigen::Matrix<double, 3, 6> cross;         // of t x c
-    Vector6 area_slope;
-    Matrix6 area_second;
+// A point of a surface: its tangents X_u, X_v, their duals, the second derivatives X_uu, X_uv, X_vv, and both forms.
+struct Point {
+    Eigen::Vector3d x, tangent[2], dual[2], second[3], normal;
+    double g[3], b[3], area, invariant[4];
 
-    Frame(const CellColumns<3>& X, const Tabulation& table, int q)
-        : x(X * table.value.col(q)), t(X * table.d[0].col(q)), c(X * table.d[1].col(q)) {
-        for (int i = 0; i < 3; ++i) second[i] = X * table.dd[i].col(q);
-        const Eigen::Vector3d N = t.cross(c);
+    // `at`: the place and its derivatives, one row each.
+    explicit Point(const Eigen::Matrix<double, 6, 3>& at) : x(at.row(0)), tangent{at.row(1), at.row(2)} {
+        const Eigen::Vector3d N = tangent[0].cross(tangent[1]);
         area = N.norm(), normal = N / area;
-        for (int i = 0; i < 3; ++i) {
-            const Eigen::Vector3d e = Eigen::Vector3d::Unit(i);
-            cross.col(i) = e.cross(c), cross.col(3 + i) = t.cross(e);
-        }
-        area_slope = cross.transpose() * normal;
-        normal_slope = (cross - normal * area_slope.transpose()) / area;
-        area_second =
-            (cross.transpose() * cross - area_slope * area_slope.transpose()) / area + along(normal / area) * area;
+        for (int i = 0; i < 3; ++i) second[i] = at.row(3 + i), b[i] = second[i].dot(normal);
+        for (int i = 0; i < 3; ++i) g[i] = tangent[i / 2].dot(tangent[(i + 1) / 2]);
+        const double det = g[0] * g[2] - g[1] * g[1];
+        dual[0] = (g[2] * tangent[0] - g[1] * tangent[1]) / det,
+        dual[1] = (g[0] * tangent[1] - g[1] * tangent[0]) / det;
+        invariant[0] = det, invariant[1] = b[0] * g[2] - 2 * b[1] * g[1] + b[2] * g[0];
+        invariant[2] = b[0] * b[2] - b[1] * b[1], invariant[3] = b[0] / g[0];
     }
-    // Second derivatives of v . (t x c) in (t, c).
-    static Matrix6 along(const Eigen::Vector3d& v) {
-        Matrix6 out = Matrix6::Zero();
-        out(0, 4) = v[2], out(0, 5) = -v[1], out(1, 3) = -v[2], out(1, 5) = v[0], out(2, 3) = v[1], out(2, 4) = -v[0];
-        out.bottomLeftCorner<3, 3>() = out.topRightCorner<3, 3>().transpose();
+    Curvatures<double> curvatures() const { return {invariant[0], invariant[1], invariant[2]}; }
+    Invariant variable(int i) const { return Invariant::variable(invariant[i], i); }
+    Curvatures<Invariant> curvature_jets() const { return {variable(0), variable(1), variable(2)}; }
+
+    // How the invariants change with g11, g12, g22, b11, b12, b22; the first and second derivatives of a function of
+    // them in these.
+    Eigen::Matrix<double, 4, 6> slopes() const {
+        Eigen::Matrix<double, 4, 6> J = Eigen::Matrix<double, 4, 6>::Zero();
+        J.topLeftCorner<1, 3>() << g[2], -2 * g[1], g[0];
+        J.row(1) << b[2], -2 * b[1], b[0], g[2], -2 * g[1], g[0];
+        J.block<1, 3>(2, 3) << b[2], -2 * b[1], b[0];
+        J(3, 0) = -b[0] / (g[0] * g[0]), J(3, 3) = 1 / g[0];
+        return J;
+    }
+    Matrix6 second_in_forms(const Eigen::Matrix<double, 4, 6>& J, const Invariant& f) const {
+        Matrix6 out = J.transpose() * (hessian(f) * J), part = Matrix6::Zero();
+        part(0, 2) = f.d[0], part(1, 1) = -f.d[0], part(3, 5) = f.d[2], part(4, 4) = -f.d[2];
+        part(2, 3) = part(0, 5) = f.d[1], part(1, 4) = -2 * f.d[1];
+        part(0, 0) = f.d[3] * b[0] / (g[0] * g[0] * g[0]), part(0, 3) = -f.d[3] / (g[0] * g[0]);
+        return out + part + part.transpose();
+    }
+};
+
+// How the unknowns of a triangle, the stretch last, move a point: columns.
+struct Change {
+    // X_u, X_v, X_uu, X_uv, X_vv along X_u, X_v, the normal and both dual tangents.
+    Rows<5> parts[5];
+    Rows<6> forms;  // g11, g12, g22, b11, b12, b22
+
+    // `D`: displacement of each node of the cell by its unknown.
+    Change(const Point& p, const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table, int q) {
+        const Eigen::Index n = D.cols(), m = n + (stretch != nullptr);
+        Eigen::Matrix<double, 5, 3> frame;
+        frame << p.tangent[0].transpose(), p.tangent[1].transpose(), p.normal.transpose(), p.dual[0].transpose(),
+            p.dual[1].transpose();
+        Rows<5> at_nodes(5, n);
+        at_nodes.noalias() = frame.lazyProduct(D);
+        for (int i = 0; i < 5; ++i) {
+            const auto functions = (i < 2 ? table.d[i] : table.dd[i - 2]).col(q);
+            parts[i].resize(5, m);
+            for (int k = 0; k < 5; ++k) parts[i].row(k).head(n) = at_nodes.row(k).cwiseProduct(functions.transpose());
+            if (stretch) parts[i].col(n) = frame * (*stretch * functions);
+        }
+        forms.resize(6, m);
+        forms.row(0) = 2 * parts[0].row(0), forms.row(1) = parts[0].row(1) + parts[1].row(0);
+        forms.row(2) = 2 * parts[1].row(1);
+        for (int i = 0; i < 3; ++i)
+            forms.row(3 + i) = parts[2 + i].row(2) - p.dual[0].dot(p.second[i]) * parts[0].row(2) -
+                               p.dual[1].dot(p.second[i]) * parts[1].row(2);
+    }
+    auto area() const { return parts[0].row(3) + parts[1].row(4); }  // relative
+};
+
+// The sum over points of left^T right and its transpose, multiplied once for all.
+class Products {
+public:
+    Products(int most_rows, Eigen::Index columns) : left_(most_rows, columns), right_(most_rows, columns) {}
+    template <class Left, class Right>
+    void add(const Left& left, const Right& right) {
+        left_.middleRows(rows_, left.rows()) = left, right_.middleRows(rows_, left.rows()).noalias() = right;
+        rows_ += static_cast<int>(left.rows());
+    }
+    RowMatrix sum() const { return left_.topRows(rows_).transpose() * right_.topRows(rows_); }
+
+private:
+    RowMatrix left_, right_;
+    int rows_ = 0;
+};
+
+// Second derivatives of sums of functions of both forms over points of one triangle. With w the displacement and p_a =
+// n.w_a, the normal changes by -p_a X^a: theory.md (10.22).
+class SecondDerivatives {
+public:
+    // `more`: rows of other products at each point.
+    SecondDerivatives(const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table, int more)
+        : products((8 + more) * table.points(), D.cols() + (stretch != nullptr)),
+          D_(D),
+          stretch_(stretch),
+          table_(table),
+          slopes_(2 * table.points(), D.cols()),
+          metric_(2 * table.points(), D.cols()),
+          last_(Rows<1>::Zero(D.cols() + (stretch != nullptr))) {}
+
+    // At point q, of a function with these derivatives in the forms.
+    void add(const Point& p, const Change& c, const Vector6& G, const Matrix6& GG, int q) {
+        Rows<6> forms(6, c.forms.cols());
+        forms.noalias() = (0.5 * GG).lazyProduct(c.forms);
+        products.add(c.forms, forms);
+        const Eigen::Vector3d S = G[3] * p.second[0] + G[4] * p.second[1] + G[5] * p.second[2];
+        Rows<2> turned(2, c.forms.cols()), normal(2, c.forms.cols());
+        for (int b = 0; b < 2; ++b) {
+            normal.row(b) = c.parts[b].row(2);
+            turned.row(b) = p.dual[0].dot(S) * c.parts[0].row(3 + b) + p.dual[1].dot(S) * c.parts[1].row(3 + b);
+            for (int i = 0; i < 3; ++i) turned.row(b) -= G[3 + i] * c.parts[2 + i].row(3 + b);
+            for (int a = 0; a < 2; ++a)
+                turned.row(b) -= 0.5 * p.normal.dot(S) * p.dual[a].dot(p.dual[b]) * c.parts[a].row(2);
+        }
+        products.add(normal, turned);
+        Eigen::Matrix2d M;
+        M << 2 * G[0], G[1], G[1], 2 * G[2];
+        for (int a = 0; a < 2; ++a) {
+            slopes_.row(2 * q + a) = table_.d[a].col(q).transpose();
+            metric_.row(2 * q + a) =
+                M(a, 0) * table_.d[0].col(q).transpose() + M(a, 1) * table_.d[1].col(q).transpose();
+        }
+        if (stretch_) add_stretch(M, q);
+    }
+    Square sum() const {
+        const Eigen::Index n = D_.cols();
+        const RowMatrix half = products.sum(), metric = slopes_.transpose() * metric_;
+        Square out = half + half.transpose();
+        out.topLeftCorner(n, n) += metric.cwiseProduct(D_.transpose() * D_);
+        if (!stretch_) return out;
+        out.row(n) += last_, out.col(n).head(n) += last_.head(n).transpose();
         return out;
     }
-    // Second derivatives of v . normal.
-    Matrix6 normal_second(const Eigen::Vector3d& v) const {
-        const double part = v.dot(normal);
-        const Vector6 slope = cross.transpose() * v;
-        Matrix6 out = along(v) - part * area_second;
-        out.noalias() -= (slope * area_slope.transpose() + area_slope * slope.transpose()) / area;
-        out.noalias() += 2 * part / area * area_slope * area_slope.transpose();
-        return out / area;
-    }
-    Curvatures curvatures() const {
-        const Form g11 = Form::variable(t.dot(t), 0), g12 = Form::variable(t.dot(c), 1),
-                   g22 = Form::variable(c.dot(c), 2);
-        const Form b11 = Form::variable(second[0].dot(normal), 3), b12 = Form::variable(second[1].dot(normal), 4),
-                   b22 = Form::variable(second[2].dot(normal), 5);
-        const Form det = g11 * g22 - g12 * g12, inverse_det = inverse(det);
-        return {sqrt(det), (b11 * g22 - 2.0 * (b12 * g12) + b22 * g11) * inverse_det,
-                (b11 * b22 - b12 * b12) * inverse_det, g11, b11};
-    }
-};
 
-// Columns of the unknowns of a triangle at a point: changes of (t, c), of the second derivatives, of the two forms.
-struct Change {
-    Columns6 tangents;
-    Columns3 second[3], normal;
-    Columns6 forms;
+    Products products;
 
-    // `D`: displacement of each node of the cell by each of its unknowns, the stretch last.
-    Change(const Frame& f, const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table, int q) {
-        const int n = static_cast<int>(D.cols()), m = n + (stretch != nullptr);
-        tangents.resize(6, m), forms.resize(6, m);
-        const auto along = [&](const Eigen::MatrixXd& functions, auto&& out) {
-            out.leftCols(n) = D * functions.col(q).asDiagonal();
-            if (stretch) out.col(n) = *stretch * functions.col(q);
-        };
-        along(table.d[0], tangents.topRows<3>()), along(table.d[1], tangents.bottomRows<3>());
-        for (int i = 0; i < 3; ++i) second[i].resize(3, m), along(table.dd[i], second[i]);
-        normal = f.normal_slope * tangents;
-        const auto t = tangents.topRows<3>(), c = tangents.bottomRows<3>();
-        forms.row(0) = 2 * f.t.transpose() * t;
-        forms.row(1) = f.t.transpose() * c + f.c.transpose() * t;
-        forms.row(2) = 2 * f.c.transpose() * c;
-        for (int i = 0; i < 3; ++i)
-            forms.row(3 + i) = f.normal.transpose() * second[i] + f.second[i].transpose() * normal;
+private:
+    void add_stretch(const Eigen::Matrix2d& M, int q) {
+        const Eigen::Index n = D_.cols();
+        const Eigen::Vector3d u = *stretch_ * table_.d[0].col(q), v = *stretch_ * table_.d[1].col(q);
+        for (int a = 0; a < 2; ++a) {
+            const Eigen::Vector3d w = M(a, 0) * u + M(a, 1) * v;
+            last_.head(n) += (w.transpose() * D_).cwiseProduct(table_.d[a].col(q).transpose());
+            last_[n] += w.dot(a == 0 ? u : v);
+        }
     }
-    // Adds the second derivatives of a function of the forms with this gradient and Hessian.
-    template <class Out>
-    void add_second(const Frame& f, const Vector6& G, const Matrix6& GG, Out&& out) const {
-        Matrix6 T = f.normal_second(G[3] * f.second[0] + G[4] * f.second[1] + G[5] * f.second[2]);
-        T.diagonal().head<3>().array() += 2 * G[0];
-        T.diagonal().tail<3>().array() += 2 * G[2];
-        T.topRightCorner<3, 3>().diagonal().array() += G[1];
-        T.bottomLeftCorner<3, 3>().diagonal().array() += G[1];
-        const Columns6 forms_part = GG * forms, tangent_part = T * tangents;
-        const Columns3 S = G[3] * second[0] + G[4] * second[1] + G[5] * second[2];
-        out.noalias() += forms.transpose() * forms_part;
-        out.noalias() += tangents.transpose() * tangent_part;
-        out.noalias() += S.transpose() * normal;
-        out.noalias() += normal.transpose() * S;
-    }
+
+    const CellColumns<3>& D_;
+    const CellColumns<3>* stretch_;
+    const Tabulation& table_;
+    RowMatrix slopes_, metric_;
+    Rows<1> last_;  // with the stretch
 };
 
 // f_H and f_K with their derivatives up to the second; those of formulas leave out the second.
@@ -144,7 +213,7 @@ MomentDerivatives moment_derivatives(const Bending& bending, const Bending& powe
     return out;
 }
 // F(H, K) of two functions of the forms.
-Form composed(const Jet<double, 2, 2>& F, const Form& H, const Form& K) {
+Invariant composed(const Jet<double, 2, 2>& F, const Invariant& H, const Invariant& K) {
     return chain(H, K, F.v, F.d[0], F.d[1], F.dd[0], F.dd[1], F.dd[2]);
 }
 
@@ -155,22 +224,42 @@ Bending powers_alone(Bending bending) {
 }
 
 // The angle between two triangles that share the tangent t, as the curvature that it concentrates: negative where
-// convex. Variables t, c of the left, c of the right.
-using Corner = Jet<double, 9, 2>;
-Corner angle(const Eigen::Vector3d& t, const Eigen::Vector3d& left, const Eigen::Vector3d& right) {
-    const auto variables = [](const Eigen::Vector3d& v, int first) {
-        return Vector3<Corner>(Corner::variable(v[0], first), Corner::variable(v[1], first + 1),
-                               Corner::variable(v[2], first + 2));
-    };
-    const Vector3<Corner> T = variables(t, 0), a = T.cross(variables(left, 3)), b = T.cross(variables(right, 6));
-    const Vector3<Corner> axb = a.cross(b);
-    return -atan2(T.dot(axb) * inverse_sqrt(T.dot(T)), a.dot(b));
+// convex; u and v cross the edge on the left and on the right. A function of t.t, t.u, t.v, u.v and t.(u x v).
+using CornerJet = Jet<double, 5, 2>;
+template <class T>
+T angle(const T& tt, const T& tu, const T& tv, const T& uv, const T& triple) {
+    using std::atan2, std::sqrt;
+    return -atan2(T(sqrt(tt) * triple), T(tt * uv - tu * tv));
 }
-Corner length(const Eigen::Vector3d& t) {
-    Corner out = Corner::variable(t[0], 0) * Corner::variable(t[0], 0);
-    for (int i = 1; i < 3; ++i) out += Corner::variable(t[i], i) * Corner::variable(t[i], i);
-    return sqrt(out);
-}
+
+struct Corner {
+    Eigen::Vector3d t, u, v;
+    double invariant[5];
+
+    Corner(const Eigen::Vector3d& t, const Eigen::Vector3d& u, const Eigen::Vector3d& v)
+        : t(t), u(u), v(v), invariant{t.dot(t), t.dot(u), t.dot(v), u.dot(v), t.dot(u.cross(v))} {}
+    CornerJet variable(int i) const { return CornerJet::variable(invariant[i], i); }
+    // How the invariants change with t, u and v; second derivatives of a function with these derivatives in them.
+    Eigen::Matrix<double, 5, 9> slopes() const {
+        Eigen::Matrix<double, 5, 9> J = Eigen::Matrix<double, 5, 9>::Zero();
+        J.block<1, 3>(0, 0) = 2 * t.transpose(), J.block<1, 3>(1, 0) = u.transpose();
+        J.block<1, 3>(1, 3) = t.transpose(), J.block<1, 3>(2, 0) = v.transpose(), J.block<1, 3>(2, 6) = t.transpose();
+        J.block<1, 3>(3, 3) = v.transpose(), J.block<1, 3>(3, 6) = u.transpose();
+        J.row(4) << u.cross(v).transpose(), v.cross(t).transpose(), t.cross(u).transpose();
+        return J;
+    }
+    Matrix9 second(const Eigen::Matrix<double, 5, 9>& J, const Eigen::Matrix<double, 5, 1>& f,
+                   const Eigen::Matrix<double, 5, 5>& ff) const {
+        const auto skew = [](const Eigen::Vector3d& w) {
+            return Eigen::Matrix3d{{0, w[2], -w[1]}, {-w[2], 0, w[0]}, {w[1], -w[0], 0}};
+        };
+        const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
+        Matrix9 part = Matrix9::Zero();
+        part.block<3, 3>(0, 0) = f[0] * one, part.block<3, 3>(0, 3) = f[1] * one + f[4] * skew(v);
+        part.block<3, 3>(0, 6) = f[2] * one - f[4] * skew(u), part.block<3, 3>(3, 6) = f[3] * one + f[4] * skew(t);
+        return J.transpose() * (ff * J) + part + part.transpose();
+    }
+};
 
 // The points of side `side` of the reference triangle, with derivatives along it and across it, to the left; or
 // backwards, and to its right.
@@ -206,14 +295,32 @@ double at_point(const SurfaceSpace& space, const Eigen::VectorXd& H0, const Bend
     return space.gather(H0, cell).dot(table.value.col(q));
 }
 
-}  // namespace
+// Displacements by each unknown of a triangle of a point, or of a derivative, where its functions have these values.
+template <class Functions>
+Rows<3> moved_by(const CellColumns<3>& D, const CellColumns<3>* stretch, const Functions& functions) {
+    Rows<3> out(3, D.cols() + (stretch != nullptr));
+    out.leftCols(D.cols()) = D * functions.asDiagonal();
+    if (stretch) out.col(D.cols()) = *stretch * functions;
+    return out;
+}
+// Changes of X_u x X_v.
+Rows<3> turned_by(const Point& p, const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table,
+                  int q) {
+    const Eigen::Index n = D.cols();
+    Rows<3> out(3, n + (stretch != nullptr)), y(3, n);
+    y = p.tangent[1] * table.d[0].col(q).transpose() - p.tangent[0] * table.d[1].col(q).transpose();
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        out.row(i).head(n) = D.row(j).cwiseProduct(y.row(k)) - D.row(k).cwiseProduct(y.row(j));
+    }
+    if (stretch) {
+        const Eigen::Vector3d u = *stretch * table.d[0].col(q), v = *stretch * table.d[1].col(q);
+        out.col(n) = u.cross(p.tangent[1]) + p.tangent[0].cross(v);
+    }
+    return out;
+}
 
-// What is known of the triangles beside an edge, the left one first.
-struct DiscreteEnergy::EdgeSides {
-    CellColumns<3> X[2], D[2], stretch[2];  // nodes, their directions and stretch, empty where not asked for
-    Eigen::RowVectorXd H0[2];
-    const Tabulation* table[2];
-};
+}  // namespace
 
 struct DiscreteEnergy::Block {
     EnergyValues values;
@@ -227,16 +334,31 @@ struct DiscreteEnergy::Block {
     }
 };
 
-DiscreteEnergy::DiscreteEnergy(const CurvedMesh& mesh, const Bending& bending) : space_(mesh) {
+DiscreteEnergy::Rule::Rule(Tabulation functions)
+    : table(std::move(functions)), stacked(6 * table.points(), table.functions()) {
+    for (int q = 0; q < table.points(); ++q) {
+        stacked.row(6 * q) = table.value.col(q).transpose();
+        for (int i = 0; i < 5; ++i)
+            stacked.row(6 * q + 1 + i) = (i < 2 ? table.d[i] : table.dd[i - 2]).col(q).transpose();
+    }
+}
+
+Eigen::MatrixX3d DiscreteEnergy::Rule::at(const CellColumns<3>& X) const {
+    Eigen::MatrixX3d out(stacked.rows(), 3);
+    for (int i = 0; i < 3; ++i) out.col(i).noalias() = stacked * X.row(i).transpose();
+    return out;
+}
+
+DiscreteEnergy::DiscreteEnergy(const CurvedMesh& mesh, const Bending& bending)
+    : space_(mesh), rule_(space_.tabulation()), edge_of_cell_(space_.cells()) {
     if (bending.kg != 0)
         throw std::invalid_argument(
             "equilibria and rates of tier surface3d have no gradient term: energy.kg must be 0");
     for (int side = 0; side < 3; ++side) {
-        left_.push_back(side_table(mesh.order, side, false));
-        right_.push_back(side_table(mesh.order, side, true));
+        left_.emplace_back(side_table(mesh.order, side, false));
+        right_.emplace_back(side_table(mesh.order, side, true));
     }
     find_edges();
-    set_pattern();
     set_penalty(mesh, bending);
 }
 
@@ -249,69 +371,45 @@ void DiscreteEnergy::find_edges() {
             const auto [at, is_new] = edges.try_emplace(std::min(first, last));
             at->second.cell[is_new ? 0 : 1] = cell, at->second.side[is_new ? 0 : 1] = side;
         }
-    for (const auto& [node, edge] : edges) edges_.push_back(edge);
+    for (const auto& [node, edge] : edges) {
+        for (int s = 0; s < 2; ++s) edge_of_cell_[edge.cell[s]] = {static_cast<int>(edges_.size()), s};
+        edges_.push_back(edge);
+    }
 }
 
-void DiscreteEnergy::set_pattern() {
-    std::vector<std::vector<int>> rows(space_.size());
-    const int n = space_.width();
-    const auto nodes_of = [&](const Edge& e) {
-        std::vector<int> nodes;
+const GroupPattern& DiscreteEnergy::groups() const {
+    if (pattern_) return *pattern_;
+    std::vector<int> nodes;
+    for (const Edge& e : edges_)
         for (int cell : e.cell)
-            for (int a = 0; a < n; ++a) nodes.push_back(space_.node(cell, a));
-        return nodes;
-    };
-    for (const Edge& e : edges_) {
-        const std::vector<int> nodes = nodes_of(e);
-        for (int b : nodes) rows[b].insert(rows[b].end(), nodes.begin(), nodes.end());
-    }
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int column = 0; column < space_.size(); ++column) {
-        auto& r = rows[column];
-        std::sort(r.begin(), r.end());
-        r.erase(std::unique(r.begin(), r.end()), r.end());
-        for (int row : r) entries.emplace_back(row, column, 0.0);
-    }
-    pattern_.resize(space_.size(), space_.size());
-    pattern_.setFromTriplets(entries.begin(), entries.end());
-    const auto slot = [&](int row, int column) {
-        const int *begin = pattern_.innerIndexPtr(), *low = begin + pattern_.outerIndexPtr()[column],
-                  *high = begin + pattern_.outerIndexPtr()[column + 1];
-        return static_cast<int>(std::lower_bound(low, high, row) - begin);
-    };
-    for (int cell = 0; cell < space_.cells(); ++cell)
-        for (int b = 0; b < n; ++b)
-            for (int a = 0; a < n; ++a) cell_slots_.push_back(slot(space_.node(cell, a), space_.node(cell, b)));
-    for (const Edge& e : edges_) {
-        const std::vector<int> nodes = nodes_of(e);
-        for (int b : nodes)
-            for (int a : nodes) edge_slots_.push_back(slot(a, b));
-    }
+            for (int a = 0; a < space_.width(); ++a) nodes.push_back(space_.node(cell, a));
+    pattern_ = group_pattern(space_.size(), nodes, 2 * space_.width());
+    return *pattern_;
 }
 
 void DiscreteEnergy::set_penalty(const CurvedMesh& mesh, const Bending& bending) {
-    const auto size_of = [&](int cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        double area = 0;
-        for (int q = 0; q < space_.tabulation().points(); ++q)
-            area += space_.tabulation().weight[q] * tangent_point(X, space_.tabulation(), q).area;
-        return area;
-    };
+    std::vector<CellColumns<3>> nodes;
+    std::vector<double> sizes(space_.cells(), 0.0);
+    for (int cell = 0; cell < space_.cells(); ++cell) {
+        nodes.push_back(cell_nodes(mesh, cell));
+        const Eigen::MatrixX3d at = rule_.at(nodes.back());
+        for (int q = 0; q < rule_.table.points(); ++q)
+            sizes[cell] += rule_.table.weight[q] * at.row(6 * q + 1).cross(at.row(6 * q + 2)).norm();
+    }
     const int k = space_.order();
     for (Edge& e : edges_) {
         double symbol = 0, width = 0, whole = 0;
         for (int s = 0; s < 2; ++s) {
-            const CellColumns<3> X = cell_nodes(mesh, e.cell[s]);
-            const Tabulation& table = (s == 0 ? left_ : right_)[e.side[s]];
+            const Rule& rule = (s == 0 ? left_ : right_)[e.side[s]];
+            const Eigen::MatrixX3d at = rule.at(nodes[e.cell[s]]);
             double along = 0;
-            for (int q = 0; q < table.points(); ++q) {
-                const SurfacePoint<double> p = curved_point(X, table, q);
-                const double x = p.tangent[0].dot(p.B * p.tangent[0]) / p.metric[0];
-                const CurvatureJet<double> f = density(bending, p.H, p.K);
-                const double length = table.weight[q] * std::sqrt(p.metric[0]);
-                symbol += length * (f.HH + 2 * f.HK * x + f.KK * x * x), along += length;
+            for (int q = 0; q < rule.table.points(); ++q) {
+                const Point p(at.middleRows<6>(6 * q));
+                const Curvatures<double> c = p.curvatures();
+                const double length = rule.table.weight[q] * std::sqrt(p.g[0]);
+                symbol += length * principal_symbol(density(bending, c.H, c.K), p.invariant[3]), along += length;
             }
-            whole += along, width += 0.5 * along / size_of(e.cell[s]);
+            whole += along, width += 0.5 * along / sizes[e.cell[s]];
         }
         e.penalty = penalty_factor * std::max(symbol / whole, 0.0) * k * (k - 1) / 2.0 * width;
     }
@@ -321,138 +419,203 @@ void DiscreteEnergy::set_penalty(const CurvedMesh& mesh, const Bending& bending)
 void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
                                 const std::optional<Formula>& potential, double sigma, double lambda,
                                 const Eigen::VectorXd& H0, int cell, Block& out) const {
+    const CellColumns<3> X = cell_nodes(mesh, cell), by_stretch = stretch_of(X),
+                         *stretch = d.stretch ? &by_stretch : nullptr;
     const bool derive = d.normal.cols() > 0;
-    const CellColumns<3> X = cell_nodes(mesh, cell), stretch = stretch_of(X);
     const CellColumns<3> D = derive ? space_.gather<3>(d.normal, cell) : CellColumns<3>();
-    const Tabulation& table = space_.tabulation();
-    const int n = space_.width() + (derive && d.stretch);
+    const Tabulation& table = rule_.table;
+    const Eigen::MatrixX3d at = rule_.at(X);
+    const int n = space_.width();
+    std::optional<SecondDerivatives> second;
+    if (out.second.size() > 0) second.emplace(D, stretch, table, 3);
     for (int q = 0; q < table.points(); ++q) {
-        const Frame f(X, table, q);
-        const Curvatures at = f.curvatures();
-        const double weight = table.weight[q], H_0 = at_point(space_, H0, bending, cell, table, q);
-        const CurvatureJet<double> F = density_at(bending, H_0, at.H.v, at.K.v);
-        const Form energy = chain(at.H, at.K, F.f, F.H, F.K, F.HH, F.HK, F.KK) * at.area, M = at.H * at.area;
-        const PointPotential W(potential, f.x);
-        out.values.potential += weight * W.value * f.area, out.values.potential_force -= weight * W.slope[2] * f.area;
-        out.values.energy += weight * (energy.v + W.value * f.area), out.values.area += weight * f.area,
-            out.values.M += weight * M.v;
+        const Point p(at.middleRows<6>(6 * q));
+        const double weight = table.weight[q], dS = weight * p.area,
+                     H_0 = at_point(space_, H0, bending, cell, table, q);
+        const Curvatures<double> c = p.curvatures();
+        const CurvatureJet<double> F = density_at(bending, H_0, c.H, c.K);
+        const PointPotential W(potential, p.x);
+        out.values.potential += dS * W.value, out.values.potential_force -= dS * W.slope[2];
+        out.values.energy += dS * (F.f + W.value), out.values.area += dS, out.values.M += dS * c.H;
         const double third = mesh.period > 0 ? 0.5 : 1.0 / 3;  // of a tube: without the ends of its period
-        Eigen::Vector3d from = f.x;
+        Eigen::Vector3d from = p.x;
         if (mesh.period > 0) from.z() = 0;
-        out.values.volume += weight * third * f.area * from.dot(f.normal);
+        out.values.volume += third * dS * from.dot(p.normal);
         if (!derive) continue;
-        const Change change(f, D, d.stretch ? &stretch : nullptr, table, q);
-        const Vector6 slope = gradient(energy);
-        out.energy.noalias() += weight * slope.transpose() * change.forms;
-        out.area.noalias() += weight * f.area_slope.transpose() * change.tangents;
-        out.M.noalias() += weight * gradient(M).transpose() * change.forms;
-        Columns3 moved(3, n);  // of the points
-        moved.leftCols(space_.width()) = D * table.value.col(q).asDiagonal();
-        if (d.stretch) moved.col(n - 1) = stretch * table.value.col(q);
-        out.volume.leftCols(space_.width()).noalias() +=
-            weight * f.area * f.normal.transpose() * moved.leftCols(space_.width());
-        const Row widens = weight * f.area_slope.transpose() * change.tangents, climbs = W.slope.transpose() * moved;
-        if (potential) out.energy += W.value * widens + weight * f.area * climbs;
-        if (d.stretch) out.volume[n - 1] += weight * 0.5 * (from.dot(f.cross * change.tangents.col(n - 1)));
-        if (out.second.size() == 0) continue;
-        change.add_second(f, weight * (slope + (sigma + W.value) * gradient(at.area)),
-                          weight * (hessian(energy) + (sigma + W.value) * hessian(at.area)), out.second);
+        const Change change(p, D, stretch, table, q);
+        const Curvatures<Invariant> jets = p.curvature_jets();
+        const Invariant energy = chain(jets.H, jets.K, F.f, F.H, F.K, F.HH, F.HK, F.KK) * jets.area;
+        const Eigen::Matrix<double, 4, 6> J = p.slopes();
+        const Rows<1> widens = dS * change.area();
+        const Rows<3> moved = moved_by(D, stretch, table.value.col(q));
+        out.energy += (weight * J.transpose() * gradient(energy)).transpose().lazyProduct(change.forms);
+        out.area += widens;
+        out.M +=
+            (weight * J.transpose() * gradient(Invariant(jets.H * jets.area))).transpose().lazyProduct(change.forms);
+        out.volume.head(n) += dS * p.normal.transpose().lazyProduct(moved.leftCols(n));
+        const Rows<1> climbs = W.slope.transpose() * moved;
+        if (potential) out.energy += W.value * widens + dS * climbs;
+        if (!second && !stretch) continue;
+        Rows<3> turned = turned_by(p, D, stretch, table, q);
+        if (stretch) out.volume[n] += weight * 0.5 * from.dot(turned.col(n));
+        if (!second) continue;
+        const Invariant all = energy + (sigma + W.value) * jets.area;
+        second->add(p, change, weight * J.transpose() * gradient(all), weight * p.second_in_forms(J, all), q);
         if (potential)
-            out.second += weight * f.area * moved.transpose() * W.second * moved + widens.transpose() * climbs +
-                          climbs.transpose() * widens;
-        const Columns3 turned = f.cross * change.tangents;  // change of t x c
-        Square part = weight * lambda * 0.5 * moved.transpose() * turned;
-        if (d.stretch) {  // a moving end is no part of the surface: the volume is linear in the stretch
-            part.col(n - 1).setZero(), part.row(n - 1).setZero();
-            part.row(n - 1).head(n - 1) =
-                weight * lambda * (moved.leftCols(n - 1).transpose() * turned.col(n - 1)).transpose();
+            out.second +=
+                dS * moved.transpose() * W.second * moved + widens.transpose() * climbs + climbs.transpose() * widens;
+        turned *= weight * lambda;
+        if (stretch) {  // a moving end is no part of the surface: the volume is linear in the stretch
+            const Rows<1> part = turned.col(n).transpose() * moved;
+            out.second.row(n).head(n) += part.head(n), out.second.col(n).head(n) += part.head(n).transpose();
+            turned.col(n).setZero();
         }
-        out.second += part + part.transpose();
+        Rows<3> swept = moved;
+        if (stretch) swept.col(n).setZero();
+        second->products.add(swept, 0.5 * turned);
     }
+    if (second) out.second += second->sum();
 }
 
-// One point of an edge, as the triangles on its left and on its right see it.
-struct DiscreteEnergy::EdgePoint {
-    Frame frame[2];
-    Form moment[2];  // f_H + f_K t.Bt: by how much the energy changes with curvature across the edge
-    Corner angle, length;
-    double mean, kink;  // of the moments; energy of the penalty
+// Two triangles beside an edge, the left one first.
+struct DiscreteEnergy::EdgeSides {
+    const Rule* rule[2];
+    CellColumns<3> X[2], D[2], stretch[2];  // nodes, their directions and stretch, empty where not asked for
+    Eigen::RowVectorXd H0[2];
 
-    EdgePoint(const EdgeSides& at, const Bending& bending, const Bending& powers, double penalty, int q)
-        : frame{{at.X[0], *at.table[0], q}, {at.X[1], *at.table[1], q}},
-          angle(surface3d::angle(frame[0].t, frame[0].c, frame[1].c)),
-          length(surface3d::length(frame[0].t)) {
-        for (int s = 0; s < 2; ++s) {
-            const Curvatures c = frame[s].curvatures();
-            const double H0 = at.H0[s].size() > 0 ? at.H0[s].dot(at.table[s]->value.col(q).transpose()) : bending.H0;
-            const MomentDerivatives F = moment_derivatives(bending, powers, H0, c.H.v, c.K.v);
-            moment[s] = composed(F.by_H, c.H, c.K) + composed(F.by_K, c.H, c.K) * (c.b11 / c.g11);
+    const CellColumns<3>* stretched(int s) const { return stretch[s].cols() > 0 ? &stretch[s] : nullptr; }
+    double H0_at(int s, int q, const Bending& bending) const {
+        return H0[s].size() > 0 ? H0[s].dot(rule[s]->table.value.col(q).transpose()) : bending.H0;
+    }
+};
+
+// One point of an edge, as both see it.
+struct DiscreteEnergy::EdgePoint {
+    Point side[2];
+    Corner corner;
+    double H0[2], angle, length, mean = 0, kink;  // mean of the moments; energy of the penalty
+
+    EdgePoint(const EdgeSides& at, const Point& left, const Point& right, const Bending& bending, double penalty, int q)
+        : side{left, right},
+          corner(left.tangent[0], left.tangent[1], right.tangent[1]),
+          H0{at.H0_at(0, q, bending), at.H0_at(1, q, bending)},
+          length(std::sqrt(corner.invariant[0])) {
+        const double* c = corner.invariant;
+        angle = surface3d::angle(c[0], c[1], c[2], c[3], c[4]);
+        kink = 0.5 * penalty * angle * angle;
+        for (int s = 0; s < 2; ++s) {  // f_H + f_K t.Bt: by how much the energy changes with curvature across the edge
+            const Curvatures<double> at_side = side[s].curvatures();
+            const CurvatureJet<double> F = density_at(bending, H0[s], at_side.H, at_side.K);
+            mean += 0.5 * (F.H + F.K * side[s].invariant[3]);
         }
-        mean = 0.5 * (moment[0].v + moment[1].v);
-        kink = 0.5 * penalty * angle.v * angle.v;
+    }
+};
+
+// Second derivatives within each of both triangles, and between them.
+struct DiscreteEnergy::EdgeSums {
+    SecondDerivatives own[2];
+    Products cross;
+
+    explicit EdgeSums(const EdgeSides& at)
+        : own{{at.D[0], at.stretched(0), at.rule[0]->table, 10}, {at.D[1], at.stretched(1), at.rule[1]->table, 4}},
+          cross(5 * at.rule[0]->table.points(), at.D[0].cols() + (at.stretched(0) != nullptr)) {}
+    void add_to(Square& out) const {
+        const Square left = own[0].sum(), right = own[1].sum(), between = cross.sum();
+        const Eigen::Index n = out.cols() / 2;
+        out.topLeftCorner(n, n) += left.topLeftCorner(n, n), out.block(n, n, n, n) += right.topLeftCorner(n, n);
+        out.block(0, n, n, n) += between.topLeftCorner(n, n);
+        out.block(n, 0, n, n) += between.topLeftCorner(n, n).transpose();
+        if (left.cols() == n) return;
+        Row last(2 * n + 1);
+        last << left.row(n).head(n) + between.col(n).head(n).transpose(), right.row(n).head(n) + between.row(n).head(n),
+            left(n, n) + right(n, n) + 2 * between(n, n);
+        out.row(2 * n) += last, out.col(2 * n).head(2 * n) += last.head(2 * n).transpose();
     }
 };
 
 void DiscreteEnergy::edge_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
                                 const Eigen::VectorXd& H0, const Edge& e, Block& out) const {
-    const Bending powers = powers_alone(bending);
+    const bool derive = d.normal.cols() > 0;
     EdgeSides at;
     for (int s = 0; s < 2; ++s) {
-        at.X[s] = cell_nodes(mesh, e.cell[s]), at.table[s] = &(s == 0 ? left_ : right_)[e.side[s]];
+        at.X[s] = cell_nodes(mesh, e.cell[s]), at.rule[s] = &(s == 0 ? left_ : right_)[e.side[s]];
         if (H0.size() > 0) at.H0[s] = space_.gather(H0, e.cell[s]).transpose();
-        if (d.normal.cols() > 0) at.D[s] = space_.gather<3>(d.normal, e.cell[s]);
+        if (derive) at.D[s] = space_.gather<3>(d.normal, e.cell[s]);
         if (d.stretch) at.stretch[s] = stretch_of(at.X[s]);
     }
-    for (int q = 0; q < left_[0].points(); ++q) {
-        const EdgePoint p(at, bending, powers, e.penalty, q);
-        const double ds = left_[0].weight[q] * p.length.v;
-        out.values.energy += ds * (p.mean * p.angle.v + p.kink);
-        out.values.M += ds * p.angle.v, out.values.kinks += ds * p.kink;
-        if (d.normal.cols() > 0) add_derivatives(at, p, e.penalty, q, out);
+    const Bending powers = derive ? powers_alone(bending) : Bending();
+    std::optional<EdgeSums> second;
+    if (out.second.size() > 0) second.emplace(at);
+    const Eigen::MatrixX3d left = at.rule[0]->at(at.X[0]), right = at.rule[1]->at(at.X[1]);
+    const Tabulation& table = at.rule[0]->table;
+    for (int q = 0; q < table.points(); ++q) {
+        const EdgePoint p(at, Point(left.middleRows<6>(6 * q)), Point(right.middleRows<6>(6 * q)), bending, e.penalty,
+                          q);
+        const double ds = table.weight[q] * p.length;
+        out.values.energy += ds * (p.mean * p.angle + p.kink);
+        out.values.M += ds * p.angle, out.values.kinks += ds * p.kink;
+        if (derive) add_derivatives(at, p, bending, powers, e.penalty, q, second ? &*second : nullptr, out);
     }
+    if (second) second->add_to(out.second);
 }
 
 // With weight (mean angle + penalty/2 angle^2) length as a function of the two moments, angle and length.
-void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, double penalty, int q, Block& out) const {
-    const int n = space_.width(), stretch = at.stretch[0].cols() > 0, all = 2 * n + stretch;
-    const double weight = left_[0].weight[q], ds = p.length.v, angle = p.angle.v;
-    const Eigen::RowVector4d slope(weight * ds * 0.5 * angle, weight * ds * 0.5 * angle,
-                                   weight * ds * (p.mean + penalty * angle), weight * (p.mean * angle + p.kink));
-    Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> first(4, all);
-    Columns9 corner = Columns9::Zero(9, all);  // changes of the tangent along the edge and of those across it
-    first.setZero();
+void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, const Bending& bending,
+                                     const Bending& powers, double penalty, int q, EdgeSums* second, Block& out) const {
+    using Vector5 = Eigen::Matrix<double, 5, 1>;
+    const int n = space_.width();
+    const double weight = at.rule[0]->table.weight[q], ds = p.length, by_moment = weight * ds * 0.5 * p.angle,
+                 by_both = weight * (p.mean + penalty * p.angle);  // angle and length
+    const auto x = [&](int i) { return p.corner.variable(i); };
+    const CornerJet angle = surface3d::angle(x(0), x(1), x(2), x(3), x(4)), length = sqrt(x(0));
+    const Eigen::Matrix<double, 5, 9> J = p.corner.slopes();
+    const Vector5 a = gradient(angle), l = gradient(length),
+                  slope = ds * by_both * a + weight * (p.mean * p.angle + p.kink) * l;
+    const Eigen::Matrix<double, 1, 9> energy = slope.transpose() * J,
+                                      M = weight * (ds * a + p.angle * l).transpose() * J;
+    Matrix9 corner;
+    if (second)
+        corner = p.corner.second(
+            J, slope,
+            ds * by_both * hessian(angle) + weight * (p.mean * p.angle + p.kink) * hessian(length) +
+                weight * penalty * ds * a * a.transpose() + by_both * (a * l.transpose() + l * a.transpose()));
+    const auto spread = [&](int s, const Rows<1>& row, Row& into) {
+        into.segment(s * n, n) += row.head(n);
+        if (row.size() > n) into[2 * n] += row[n];
+    };
+    Rows<1> moments[2], halves[2];  // halves: of M
+    Rows<3> tangents[3];            // along the edge, which both share; across it on the left, on the right
     for (int s = 0; s < 2; ++s) {
-        const Change change(p.frame[s], at.D[s], stretch ? &at.stretch[s] : nullptr, *at.table[s], q);
-        const auto spread = [&](const auto& columns, auto&& into) {
-            into.middleCols(s * n, n) = columns.leftCols(n);
-            if (stretch) into.col(2 * n) = columns.col(n);
-        };
-        const Vector6 by_forms = gradient(p.moment[s]);
-        spread(by_forms.transpose() * change.forms, first.row(s));
-        spread(change.tangents.bottomRows<3>(), corner.middleRows<3>(3 + 3 * s));
-        if (s == 0) spread(change.tangents.topRows<3>(), corner.topRows<3>());  // both sides share it
-        if (out.second.size() == 0) continue;
-        Square own = Square::Zero(n + stretch, n + stretch);
-        change.add_second(p.frame[s], slope[s] * by_forms, slope[s] * hessian(p.moment[s]), own);
-        out.second.block(s * n, s * n, n, n) += own.topLeftCorner(n, n);
-        if (!stretch) continue;
-        out.second.col(2 * n).segment(s * n, n) += own.col(n).head(n);
-        out.second.row(2 * n).segment(s * n, n) += own.row(n).head(n);
-        out.second(2 * n, 2 * n) += own(n, n);
+        const Tabulation& table = at.rule[s]->table;
+        const Point& point = p.side[s];
+        const Change change(point, at.D[s], at.stretched(s), table, q);
+        const Curvatures<Invariant> jets = point.curvature_jets();
+        const MomentDerivatives F = moment_derivatives(bending, powers, p.H0[s], jets.H.v, jets.K.v);
+        const Invariant moment =
+            composed(F.by_H, jets.H, jets.K) + composed(F.by_K, jets.H, jets.K) * point.variable(3);
+        const Eigen::Matrix<double, 4, 6> in_forms = point.slopes();
+        const Vector6 by_forms = in_forms.transpose() * gradient(moment);
+        moments[s] = by_forms.transpose().lazyProduct(change.forms);
+        const int first = s == 0 ? 0 : 2, last = s == 0 ? 1 : 2;
+        Rows<1> own = by_moment * moments[s];
+        halves[s] = Rows<1>::Zero(own.size());
+        for (int i = first; i <= last; ++i) {
+            tangents[i] = moved_by(at.D[s], at.stretched(s), table.d[i == 0 ? 0 : 1].col(q));
+            own += energy.segment<3>(3 * i).lazyProduct(tangents[i]);
+            halves[s] += 0.5 * M.segment<3>(3 * i).lazyProduct(tangents[i]);
+        }
+        spread(s, own, out.energy), spread(s, 2 * halves[s], out.M);
+        if (!second) continue;
+        SecondDerivatives& sums = second->own[s];
+        sums.add(point, change, by_moment * by_forms, by_moment * point.second_in_forms(in_forms, moment), q);
+        for (int i = first; i <= last; ++i)
+            sums.products.add(tangents[i], 0.5 * corner.block<3, 3>(3 * i, 3 * i) * tangents[i]);
+        sums.products.add(moments[s], halves[s]);
     }
-    first.row(2) = gradient(p.angle).transpose() * corner, first.row(3) = gradient(p.length).transpose() * corner;
-    Eigen::Matrix4d twice = Eigen::Matrix4d::Zero();
-    twice(0, 2) = twice(1, 2) = weight * ds * 0.5, twice(0, 3) = twice(1, 3) = weight * 0.5 * angle;
-    twice(2, 3) = weight * (p.mean + penalty * angle);
-    twice += twice.transpose().eval();
-    twice(2, 2) = weight * penalty * ds;
-    out.energy.noalias() += slope * first;
-    out.M.noalias() += weight * (ds * first.row(2) + angle * first.row(3));
-    if (out.second.size() == 0) return;
-    const Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most_columns> twice_first = twice * first;
-    const Columns9 corner_part = (slope[2] * hessian(p.angle) + slope[3] * hessian(p.length)) * corner;
-    out.second.noalias() += first.transpose() * twice_first;
-    out.second.noalias() += corner.transpose() * corner_part;
+    if (!second) return;
+    second->own[0].products.add(tangents[0], corner.block<3, 3>(0, 3) * tangents[1]);
+    second->cross.add(corner.block<3, 3>(6, 0) * tangents[0] + corner.block<3, 3>(6, 3) * tangents[1], tangents[2]);
+    second->cross.add(moments[0], halves[1]), second->cross.add(halves[0], moments[1]);
 }
 
 EnergyValues DiscreteEnergy::values(const CurvedMesh& mesh, const Bending& bending, const Eigen::VectorXd& H0) const {
@@ -480,7 +643,7 @@ void DiscreteEnergy::add(const Block& block, const std::vector<int>& nodes, cons
         out.energy[nodes[i]] += block.energy[i], out.area[nodes[i]] += block.area[i];
         out.volume[nodes[i]] += block.volume[i], out.M[nodes[i]] += block.M[i];
         for (int j = 0; j < block.second.cols() && j < n; ++j)
-            out.hessian.valuePtr()[slots[i * n + j]] += block.second(j, i);
+            out.hessian.valuePtr()[slots[i * 2 * space_.width() + j]] += block.second(j, i);
     }
     if (out.with_stretch.size() == 0) return;
     out.energy[N] += block.energy[n], out.area[N] += block.area[n], out.volume[N] += block.volume[n];
@@ -497,7 +660,7 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
     const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     const int N = space_.size() + directions.stretch, n = space_.width(), cells = space_.cells();
     for (Eigen::VectorXd* v : {&out.energy, &out.area, &out.volume, &out.M}) v->setZero(N);
-    if (second) out.hessian = pattern_;
+    if (second) out.hessian = pattern();
     if (directions.stretch) out.with_stretch.setZero(space_.size());
     constexpr int batch = 256;  // blocks that are in memory at once
     std::vector<Block> blocks(batch);
@@ -520,8 +683,7 @@ EnergyDerivatives DiscreteEnergy::derivatives(const CurvedMesh& mesh, const Dire
             const bool is_cell = i < cells;
             for (int s = 0; s < (is_cell ? 1 : 2); ++s)
                 for (int a = 0; a < n; ++a) nodes.push_back(space_.node(is_cell ? i : edges_[i - cells].cell[s], a));
-            const int* slots = is_cell ? &cell_slots_[static_cast<std::size_t>(i) * n * n]
-                                       : &edge_slots_[static_cast<std::size_t>(i - cells) * 4 * n * n];
+            const int* slots = second ? (is_cell ? slots_of_cell(i) : slots_of_edge(i - cells)) : nullptr;
             add(blocks[i - begin], nodes, slots, out);
         }
     }
@@ -536,11 +698,11 @@ Eigen::VectorXd DiscreteEnergy::place_slope(const CurvedMesh& mesh, const Direct
     for (int cell = 0; cell < space_.cells(); ++cell) {
         const CellColumns<3> X = cell_nodes(mesh, cell), D = space_.gather<3>(directions.normal, cell);
         for (int q = 0; q < table.points(); ++q) {
-            const Frame f(X, table, q);
-            const J place[]{J::variable(f.x[0], 0), J::variable(f.x[1], 1), J::variable(f.x[2], 2), J(P)},
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            const J place[]{J::variable(p.x[0], 0), J::variable(p.x[1], 1), J::variable(p.x[2], 2), J(P)},
                 w = evaluate(W, place);
-            const Eigen::Vector3d climbs = f.area * Eigen::Vector3d(w.d[0], w.d[1], w.d[2]),
-                                  along_t = w.v * f.area_slope.head<3>(), along_c = w.v * f.area_slope.tail<3>();
+            const Eigen::Vector3d climbs = p.area * Eigen::Vector3d(w.d[0], w.d[1], w.d[2]),
+                                  along_t = w.v * p.area * p.dual[0], along_c = w.v * p.area * p.dual[1];
             for (int a = 0; a < space_.width(); ++a)
                 out[space_.node(cell, a)] +=
                     table.weight[q] *
@@ -551,7 +713,7 @@ Eigen::VectorXd DiscreteEnergy::place_slope(const CurvedMesh& mesh, const Direct
 }
 
 Eigen::SparseMatrix<double> DiscreteEnergy::mass(const CurvedMesh& mesh, const Directions& directions) const {
-    Eigen::SparseMatrix<double> out = pattern_;
+    Eigen::SparseMatrix<double> out = pattern();
     const Tabulation& table = space_.tabulation();
     const int n = space_.width();
     for (int cell = 0; cell < space_.cells(); ++cell) {
@@ -562,8 +724,9 @@ Eigen::SparseMatrix<double> DiscreteEnergy::mass(const CurvedMesh& mesh, const D
             const Row w = (p.normal.transpose() * D).cwiseProduct(table.value.col(q).transpose());
             block.noalias() += table.weight[q] * p.area * w.transpose() * w;
         }
-        const int* slots = &cell_slots_[static_cast<std::size_t>(cell) * n * n];
-        for (int i = 0; i < n * n; ++i) out.valuePtr()[slots[i]] += block.data()[i];
+        const int* slots = slots_of_cell(cell);
+        for (int b = 0; b < n; ++b)
+            for (int a = 0; a < n; ++a) out.valuePtr()[slots[b * 2 * n + a]] += block(a, b);
     }
     return out;
 }

@@ -5,10 +5,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <array>
 #include <optional>
 #include <vector>
 
 #include "common/energy/bending.hpp"
+#include "surface3d/fem/group_pattern.hpp"
 #include "surface3d/fem/surface_space.hpp"
 
 namespace tubule::surface3d {
@@ -52,7 +54,7 @@ public:
 
     const SurfaceSpace& space() const { return space_; }
     // A zero matrix of the pattern of the Hessian.
-    const Eigen::SparseMatrix<double>& pattern() const { return pattern_; }
+    const Eigen::SparseMatrix<double>& pattern() const { return groups().zero; }
 
     // The sums over a mesh with these triangles; where areas differ, with an energy with_M(). H0 at the nodes, where it
     // varies.
@@ -73,27 +75,47 @@ private:
         int cell[2], side[2];
         double penalty = 0;
     };
+    // Functions at the points of a rule, and a matrix of their values and derivatives, six rows a point.
+    struct Rule {
+        Tabulation table;
+        Eigen::MatrixXd stacked;
+
+        explicit Rule(Tabulation functions);
+        Eigen::MatrixX3d at(const CellColumns<3>& X) const;
+    };
     struct Block;
     struct EdgeSides;
     struct EdgePoint;
+    struct EdgeSums;
 
     void find_edges();
-    void set_pattern();
+    // The triangles of an edge are a group; made when it is first asked for, by one thread.
+    const GroupPattern& groups() const;
+    // Where the matrix of an edge begins, and that of a cell within one of its edges, column by column of the former.
+    const int* slots_of_edge(int edge) const {
+        return &groups().slots[static_cast<std::size_t>(edge) * 4 * space_.width() * space_.width()];
+    }
+    const int* slots_of_cell(int cell) const {
+        const auto [edge, side] = edge_of_cell_[cell];
+        return slots_of_edge(edge) + side * space_.width() * (2 * space_.width() + 1);
+    }
     void add(const Block& block, const std::vector<int>& nodes, const int* slots, EnergyDerivatives& out) const;
     void cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
                     const std::optional<Formula>& potential, double sigma, double lambda, const Eigen::VectorXd& H0,
                     int cell, Block& out) const;
     void edge_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending, const Eigen::VectorXd& H0,
                     const Edge& edge, Block& out) const;
-    void add_derivatives(const EdgeSides& at, const EdgePoint& p, double penalty, int q, Block& out) const;
+    void add_derivatives(const EdgeSides& at, const EdgePoint& p, const Bending& bending, const Bending& powers,
+                         double penalty, int q, EdgeSums* second, Block& out) const;
 
     SurfaceSpace space_;
+    Rule rule_;
     std::vector<Edge> edges_;
+    std::vector<std::array<int, 2>> edge_of_cell_;  // one of its edges, and on which side of it the cell is
     // Tables at the points of each edge, along and across it, as the cell on its left sees them, and the one on its
     // right, whose side runs backwards.
-    std::vector<Tabulation> left_, right_;
-    Eigen::SparseMatrix<double> pattern_;
-    std::vector<int> cell_slots_, edge_slots_;
+    std::vector<Rule> left_, right_;
+    mutable std::optional<GroupPattern> pattern_;
 };
 
 }  // namespace tubule::surface3d

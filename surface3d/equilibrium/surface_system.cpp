@@ -105,7 +105,7 @@ void SurfaceSystem::set_mesh(const CurvedMesh& mesh) {
 
 void SurfaceSystem::set_problem(const StationaryProblem& problem) {
     check_problem(problem, base_.period);
-    if (!same_energy(problem.bending, problem_.bending)) last_.reset();
+    if (!same_energy(problem.bending, problem_.bending)) last_.reset(), sums_.reset();
     problem_ = problem;
 }
 
@@ -115,7 +115,7 @@ void SurfaceSystem::set_base(const CurvedMesh& mesh) {
     energy_->set_penalty(base_, problem_.bending);
     mass_ = energy_->mass(base_, directions_);
     set_motions();
-    last_.reset();
+    last_.reset(), sums_.reset();
     scale_ = reference_energy(unknowns_at_base());
 }
 
@@ -218,8 +218,16 @@ double SurfaceSystem::length(const Eigen::VectorXd& u) const {
     return beads_ ? BeadEquations::distance(bead_numbers(u)) : mesh(u).period;
 }
 
+const EnergyValues& SurfaceSystem::sums(const Eigen::VectorXd& u) const {
+    if (!sums_ || sums_at_ != u.head(shape_size())) {
+        sums_at_ = u.head(shape_size());
+        sums_ = energy_->values(mesh(u), problem_.bending, H0_);
+    }
+    return *sums_;
+}
+
 EnergyValues SurfaceSystem::values(const Eigen::VectorXd& u) const {
-    EnergyValues v = energy_->values(mesh(u), problem_.bending, H0_);
+    EnergyValues v = sums(u);
     v.energy += area_difference_energy(problem_.bending, v.M);
     return v;
 }
@@ -361,7 +369,7 @@ bool SurfaceSystem::admissible(const Eigen::VectorXd& u) const {
     const CurvedMesh at = mesh(u);
     if ((base_.period > 0 && !(at.period > 0)) || !(mesh_quality(at).worst > least_admissible)) return false;
     if (!(wall_distance(at, problem_.bending.potentials).value > 0)) return false;
-    const EnergyValues v = energy_->values(at, problem_.bending, H0_);
+    const EnergyValues& v = sums(u);
     return std::isfinite(v.energy) && v.kinks < most_kinks * scale_;
 }
 

@@ -94,6 +94,7 @@ private:
     MultiplierEquations equations(const EnergyValues& v, const Eigen::VectorXd& u) const;
     void set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     const EnergyDerivatives& derivatives(const Eigen::VectorXd& u) const;
+    const EnergyValues& sums(const Eigen::VectorXd& u) const;  // without area differences
     ConstrainedForm second_variation(const Eigen::VectorXd& u) const;
     double stiffness(const Eigen::VectorXd& u) const;  // a size of its eigenvalues
     bool take_new_mesh(const CurvedMesh& shape, int triangles, Eigen::VectorXd& u, Eigen::VectorXd* along);
@@ -117,9 +118,10 @@ private:
     std::optional<Turn> turn_;
     Eigen::MatrixXd motions_;  // functionals of w, one column each, that hold the motions; orthonormal
     double scale_ = 0;         // reference energy of the base
-    // The last derivatives, and where they were taken.
-    mutable Eigen::VectorXd at_;
+    // The last derivatives and sums, and where they were taken: these at a shape.
+    mutable Eigen::VectorXd at_, sums_at_;
     mutable std::optional<EnergyDerivatives> last_;
+    mutable std::optional<EnergyValues> sums_;
 };
 
 // Unit normals at the nodes: means over the triangles around them.

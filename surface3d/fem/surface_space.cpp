@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/solve/pause.hpp"
+#include "surface3d/fem/group_pattern.hpp"
 
 namespace tubule::surface3d {
 
@@ -48,29 +49,8 @@ void SurfaceSpace::set_colours() {
 }
 
 void SurfaceSpace::set_pattern() {
-    std::vector<std::vector<int>> rows(size_);  // of each column
-    for (int cell = 0; cell < cells(); ++cell)
-        for (int b = 0; b < width_; ++b)
-            for (int a = 0; a < width_; ++a) rows[node(cell, b)].push_back(node(cell, a));
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int column = 0; column < size_; ++column) {
-        auto& r = rows[column];
-        std::sort(r.begin(), r.end());
-        r.erase(std::unique(r.begin(), r.end()), r.end());
-        for (int row : r) entries.emplace_back(row, column, 0.0);
-    }
-    pattern_.resize(size_, size_);
-    pattern_.setFromTriplets(entries.begin(), entries.end());
-
-    const int* begin = pattern_.innerIndexPtr();
-    for (int cell = 0; cell < cells(); ++cell)
-        for (int b = 0; b < width_; ++b) {
-            const int column = node(cell, b);
-            const int *low = begin + pattern_.outerIndexPtr()[column],
-                      *high = begin + pattern_.outerIndexPtr()[column + 1];
-            for (int a = 0; a < width_; ++a)
-                slots_.push_back(static_cast<int>(std::lower_bound(low, high, node(cell, a)) - begin));
-        }
+    GroupPattern made = group_pattern(size_, cells_, width_);
+    pattern_ = std::move(made.zero), slots_ = std::move(made.slots);
 }
 
 Eigen::SparseMatrix<double> mass_matrix(const SurfaceSpace& space, const CurvedMesh& mesh) {

@@ -66,6 +66,14 @@ Errors taylor(const CurvedMesh& mesh, bool stretch, double step, const Eigen::Ve
         return g.energy + sigma * g.area + lambda * g.volume;
     };
     const EnergyDerivatives at = E.derivatives(mesh, d, bending, sigma, lambda, H0);
+    const EnergyDerivatives alone = E.derivatives(mesh, d, bending, sigma, lambda, H0, false);
+    EXPECT_LT((slope(alone) - slope(at)).norm(), 1e-12 * slope(at).norm());
+    EXPECT_LT((alone.M - at.M).norm(), 1e-12 * at.M.norm());
+    const EnergyValues values = E.values(mesh, bending, H0);
+    for (const EnergyValues& v : {alone.values, values}) {
+        EXPECT_NEAR(sum(v), sum(at.values), 1e-12 * std::abs(sum(v)));
+        EXPECT_NEAR(v.kinks, at.values.kinks, 1e-12 * v.kinks);
+    }
     const EnergyValues after = E.values(moved(step), bending, H0), before = E.values(moved(-step), bending, H0);
     const double first = slope(at).dot(w), differences = (sum(after) - sum(before)) / (2 * step);
     EXPECT_NEAR(at.M.dot(w), (after.M - before.M) / (2 * step), 2e-3 * std::abs(at.M.dot(w)) + 1e-9);
