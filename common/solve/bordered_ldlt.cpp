@@ -5,6 +5,7 @@ namespace {
 
 constexpr double most_growth = 1e6;  // rounding in the factors is this many epsilon, which refinement makes up for
 constexpr int refinements = 2;
+constexpr double small_change = 1e-9;  // the next one would be as small again, beside this one
 
 }  // namespace
 
@@ -29,7 +30,11 @@ void BorderedLdlt::factor(const Eigen::SparseMatrix<double>& whole) {
     const Eigen::MatrixXd columns = whole.rightCols(border_);
     rows_ = whole.bottomRows(border_).leftCols(n);
     solved_.resize(n, border_);
-    for (int j = 0; j < border_; ++j) solved_.col(j) = ldlt_->solve(Eigen::VectorXd(columns.col(j).head(n)));
+    for (int j = 0; j < border_; ++j)
+        if (const Eigen::VectorXd column = columns.col(j).head(n); column.isZero(0))
+            solved_.col(j).setZero();
+        else
+            solved_.col(j) = ldlt_->solve(column);
     complement_ = columns.bottomRows(border_) - rows_ * solved_;
     complement_lu_.compute(complement_);
 }
@@ -47,7 +52,11 @@ Eigen::VectorXd BorderedLdlt::solve_once(const Eigen::VectorXd& b) const {
 
 Eigen::VectorXd BorderedLdlt::solve(const Eigen::VectorXd& b) const {
     Eigen::VectorXd x = solve_once(b);
-    for (int k = 0; k < refinements; ++k) x += solve_once(b - whole_ * x);
+    for (int k = 0; k < refinements; ++k) {
+        const Eigen::VectorXd change = solve_once(b - whole_ * x);
+        x += change;
+        if (change.lpNorm<Eigen::Infinity>() < small_change * x.lpNorm<Eigen::Infinity>()) break;
+    }
     if (!x.allFinite()) throw SolveError("the solution is not finite");
     return x;
 }

@@ -10,10 +10,12 @@ namespace tubule::surface3d {
 namespace {
 
 constexpr int most_own = max_cell_nodes + 1, most_columns = 2 * max_cell_nodes + 1;  // of a triangle; of two
+// One column for each unknown of a triangle, the stretch after its nodes, then zeros.
 template <int rows>
-using Rows = Eigen::Matrix<double, rows, Eigen::Dynamic, Eigen::RowMajor, rows, most_own>;
+using Rows = Eigen::Matrix<double, rows, most_own, Eigen::RowMajor>;
 using Row = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, most_columns>;
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using RowStack = Eigen::Matrix<double, Eigen::Dynamic, most_own, Eigen::RowMajor>;
+using Own = Eigen::Matrix<double, most_own, most_own, Eigen::RowMajor>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_columns, most_columns>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -85,73 +87,79 @@ struct Point {
     }
 };
 
-// How the unknowns of a triangle, the stretch last, move a point: columns.
-struct Change {
-    // X_u, X_v, X_uu, X_uv, X_vv along X_u, X_v, the normal and both dual tangents.
-    Rows<5> parts[5];
-    Rows<6> forms;  // g11, g12, g22, b11, b12, b22
+// Displacements of a triangle by its unknowns: of each node by its own, and of all by the stretch.
+struct Moves {
+    Rows<3> nodes = Rows<3>::Zero(), stretch = Rows<3>::Zero();
+    int count = 0, all = 0;  // of nodes; with the stretch
 
-    // `D`: displacement of each node of the cell by its unknown.
-    Change(const Point& p, const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table, int q) {
-        const Eigen::Index n = D.cols(), m = n + (stretch != nullptr);
+    // By each unknown of a point, or of a derivative, where the functions have these values.
+    template <class Functions>
+    Rows<3> by(const Functions& functions) const {
+        Rows<3> out;
+        for (int i = 0; i < 3; ++i) out.row(i) = nodes.row(i).cwiseProduct(functions);
+        if (all > count) out.col(count) = stretch * functions.transpose();
+        return out;
+    }
+};
+
+// How the unknowns move a point: X_u, X_v, X_uu, X_uv, X_vv along X_u, X_v, the normal and both dual tangents; and how
+// they change g11, g12, g22, b11, b12, b22.
+struct Change {
+    Rows<5> parts[5];
+    Rows<6> forms;
+
+    // `functions`: the derivatives of the functions, one row each.
+    template <class Functions>
+    Change(const Point& p, const Moves& moves, const Functions& functions) {
         Eigen::Matrix<double, 5, 3> frame;
         frame << p.tangent[0].transpose(), p.tangent[1].transpose(), p.normal.transpose(), p.dual[0].transpose(),
             p.dual[1].transpose();
-        Rows<5> at_nodes(5, n);
-        at_nodes.noalias() = frame.lazyProduct(D);
+        const Rows<5> at_nodes = frame.lazyProduct(moves.nodes);
         for (int i = 0; i < 5; ++i) {
-            const auto functions = (i < 2 ? table.d[i] : table.dd[i - 2]).col(q);
-            parts[i].resize(5, m);
-            for (int k = 0; k < 5; ++k) parts[i].row(k).head(n) = at_nodes.row(k).cwiseProduct(functions.transpose());
-            if (stretch) parts[i].col(n) = frame * (*stretch * functions);
+            for (int k = 0; k < 5; ++k) parts[i].row(k) = at_nodes.row(k).cwiseProduct(functions.row(i));
+            if (moves.all > moves.count)
+                parts[i].col(moves.count) = frame * (moves.stretch * functions.row(i).transpose());
         }
-        forms.resize(6, m);
         forms.row(0) = 2 * parts[0].row(0), forms.row(1) = parts[0].row(1) + parts[1].row(0);
         forms.row(2) = 2 * parts[1].row(1);
         for (int i = 0; i < 3; ++i)
             forms.row(3 + i) = parts[2 + i].row(2) - p.dual[0].dot(p.second[i]) * parts[0].row(2) -
                                p.dual[1].dot(p.second[i]) * parts[1].row(2);
     }
-    auto area() const { return parts[0].row(3) + parts[1].row(4); }  // relative
+    Rows<1> area() const { return parts[0].row(3) + parts[1].row(4); }  // relative
 };
 
-// The sum over points of left^T right and its transpose, multiplied once for all.
+// Sums over points of left^T right, multiplied once for all.
 class Products {
 public:
-    Products(int most_rows, Eigen::Index columns) : left_(most_rows, columns), right_(most_rows, columns) {}
+    explicit Products(int most_rows) : left_(most_rows, most_own), right_(most_rows, most_own) {}
     template <class Left, class Right>
     void add(const Left& left, const Right& right) {
-        left_.middleRows(rows_, left.rows()) = left, right_.middleRows(rows_, left.rows()).noalias() = right;
-        rows_ += static_cast<int>(left.rows());
+        left_.middleRows<Left::RowsAtCompileTime>(rows_) = left;
+        right_.middleRows<Left::RowsAtCompileTime>(rows_) = right;
+        rows_ += Left::RowsAtCompileTime;
     }
-    RowMatrix sum() const { return left_.topRows(rows_).transpose() * right_.topRows(rows_); }
+    Own sum() const { return left_.topRows(rows_).transpose() * right_.topRows(rows_); }
 
 private:
-    RowMatrix left_, right_;
+    RowStack left_, right_;
     int rows_ = 0;
 };
 
-// Second derivatives of sums of functions of both forms over points of one triangle. With w the displacement and p_a =
-// n.w_a, the normal changes by -p_a X^a: theory.md (10.22).
+// Second derivatives of sums of functions of both forms over points of one triangle. Where p_a = n.w_a of a
+// displacement w, the normal changes by -p_a X^a.
 class SecondDerivatives {
 public:
-    // `more`: rows of other products at each point.
-    SecondDerivatives(const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table, int more)
-        : products((8 + more) * table.points(), D.cols() + (stretch != nullptr)),
-          D_(D),
-          stretch_(stretch),
-          table_(table),
-          slopes_(2 * table.points(), D.cols()),
-          metric_(2 * table.points(), D.cols()),
-          last_(Rows<1>::Zero(D.cols() + (stretch != nullptr))) {}
+    // `more`: rows of other products at each point, which are added with their transpose.
+    SecondDerivatives(const Moves& moves, int points, int more)
+        : products((8 + more) * points), moves_(moves), metric_(2 * points) {}
 
-    // At point q, of a function with these derivatives in the forms.
-    void add(const Point& p, const Change& c, const Vector6& G, const Matrix6& GG, int q) {
-        Rows<6> forms(6, c.forms.cols());
-        forms.noalias() = (0.5 * GG).lazyProduct(c.forms);
-        products.add(c.forms, forms);
+    // At a point, of a function with these derivatives in the forms.
+    template <class Functions>
+    void add(const Point& p, const Change& c, const Vector6& G, const Matrix6& GG, const Functions& functions) {
+        products.add(c.forms, Rows<6>((0.5 * GG).lazyProduct(c.forms)));
         const Eigen::Vector3d S = G[3] * p.second[0] + G[4] * p.second[1] + G[5] * p.second[2];
-        Rows<2> turned(2, c.forms.cols()), normal(2, c.forms.cols());
+        Rows<2> turned, normal;
         for (int b = 0; b < 2; ++b) {
             normal.row(b) = c.parts[b].row(2);
             turned.row(b) = p.dual[0].dot(S) * c.parts[0].row(3 + b) + p.dual[1].dot(S) * c.parts[1].row(3 + b);
@@ -162,19 +170,19 @@ public:
         products.add(normal, turned);
         Eigen::Matrix2d M;
         M << 2 * G[0], G[1], G[1], 2 * G[2];
-        for (int a = 0; a < 2; ++a) {
-            slopes_.row(2 * q + a) = table_.d[a].col(q).transpose();
-            metric_.row(2 * q + a) =
-                M(a, 0) * table_.d[0].col(q).transpose() + M(a, 1) * table_.d[1].col(q).transpose();
-        }
-        if (stretch_) add_stretch(M, q);
+        const Rows<2> slopes = functions.template topRows<2>();
+        metric_.add(slopes, Rows<2>(M.lazyProduct(slopes)));
+        if (moves_.all == moves_.count) return;
+        const Eigen::Matrix<double, 3, 2> stretch = moves_.stretch * slopes.transpose(), w = stretch * M;
+        for (int a = 0; a < 2; ++a) last_ += (w.col(a).transpose() * moves_.nodes).cwiseProduct(slopes.row(a));
+        last_[moves_.count] += w.cwiseProduct(stretch).sum();
     }
-    Square sum() const {
-        const Eigen::Index n = D_.cols();
-        const RowMatrix half = products.sum(), metric = slopes_.transpose() * metric_;
-        Square out = half + half.transpose();
-        out.topLeftCorner(n, n) += metric.cwiseProduct(D_.transpose() * D_);
-        if (!stretch_) return out;
+    Own sum() const {
+        const Own half = products.sum();
+        Own out = half + half.transpose();
+        out += metric_.sum().cwiseProduct(moves_.nodes.transpose() * moves_.nodes);
+        if (moves_.all == moves_.count) return out;
+        const int n = moves_.count;
         out.row(n) += last_, out.col(n).head(n) += last_.head(n).transpose();
         return out;
     }
@@ -182,21 +190,9 @@ public:
     Products products;
 
 private:
-    void add_stretch(const Eigen::Matrix2d& M, int q) {
-        const Eigen::Index n = D_.cols();
-        const Eigen::Vector3d u = *stretch_ * table_.d[0].col(q), v = *stretch_ * table_.d[1].col(q);
-        for (int a = 0; a < 2; ++a) {
-            const Eigen::Vector3d w = M(a, 0) * u + M(a, 1) * v;
-            last_.head(n) += (w.transpose() * D_).cwiseProduct(table_.d[a].col(q).transpose());
-            last_[n] += w.dot(a == 0 ? u : v);
-        }
-    }
-
-    const CellColumns<3>& D_;
-    const CellColumns<3>* stretch_;
-    const Tabulation& table_;
-    RowMatrix slopes_, metric_;
-    Rows<1> last_;  // with the stretch
+    const Moves& moves_;
+    Products metric_;
+    Rows<1> last_ = Rows<1>::Zero();  // with the stretch
 };
 
 // f_H and f_K with their derivatives up to the second; those of formulas leave out the second.
@@ -283,9 +279,13 @@ Tabulation side_table(int order, int side, bool backwards) {
     return table;
 }
 
-CellColumns<3> stretch_of(const CellColumns<3>& X) {
-    CellColumns<3> out = CellColumns<3>::Zero(3, X.cols());
-    out.row(2) = X.row(2);
+// `directions` are empty where nothing moves.
+Moves moves_of(const SurfaceSpace& space, const Directions& directions, int cell, const CellColumns<3>& X) {
+    Moves out;
+    if (directions.normal.cols() == 0) return out;
+    out.count = space.width(), out.all = out.count + directions.stretch;
+    out.nodes.leftCols(out.count) = space.gather<3>(directions.normal, cell);
+    out.stretch.row(2).head(out.count) = X.row(2);
     return out;
 }
 
@@ -295,27 +295,15 @@ double at_point(const SurfaceSpace& space, const Eigen::VectorXd& H0, const Bend
     return space.gather(H0, cell).dot(table.value.col(q));
 }
 
-// Displacements by each unknown of a triangle of a point, or of a derivative, where its functions have these values.
-template <class Functions>
-Rows<3> moved_by(const CellColumns<3>& D, const CellColumns<3>* stretch, const Functions& functions) {
-    Rows<3> out(3, D.cols() + (stretch != nullptr));
-    out.leftCols(D.cols()) = D * functions.asDiagonal();
-    if (stretch) out.col(D.cols()) = *stretch * functions;
-    return out;
-}
 // Changes of X_u x X_v.
-Rows<3> turned_by(const Point& p, const CellColumns<3>& D, const CellColumns<3>* stretch, const Tabulation& table,
-                  int q) {
-    const Eigen::Index n = D.cols();
-    Rows<3> out(3, n + (stretch != nullptr)), y(3, n);
-    y = p.tangent[1] * table.d[0].col(q).transpose() - p.tangent[0] * table.d[1].col(q).transpose();
+template <class Functions>
+Rows<3> turned_by(const Point& p, const Moves& moves, const Functions& functions) {
+    const Rows<3> u = moves.by(functions.row(0)), v = moves.by(functions.row(1));
+    Rows<3> out;
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
-        out.row(i).head(n) = D.row(j).cwiseProduct(y.row(k)) - D.row(k).cwiseProduct(y.row(j));
-    }
-    if (stretch) {
-        const Eigen::Vector3d u = *stretch * table.d[0].col(q), v = *stretch * table.d[1].col(q);
-        out.col(n) = u.cross(p.tangent[1]) + p.tangent[0].cross(v);
+        out.row(i) = u.row(j) * p.tangent[1][k] - u.row(k) * p.tangent[1][j] + p.tangent[0][j] * v.row(k) -
+                     p.tangent[0][k] * v.row(j);
     }
     return out;
 }
@@ -334,18 +322,20 @@ struct DiscreteEnergy::Block {
     }
 };
 
-DiscreteEnergy::Rule::Rule(Tabulation functions)
-    : table(std::move(functions)), stacked(6 * table.points(), table.functions()) {
+DiscreteEnergy::Rule::Rule(Tabulation functions) : table(std::move(functions)) {
+    stacked.setZero(6 * table.points(), most_own);
     for (int q = 0; q < table.points(); ++q) {
-        stacked.row(6 * q) = table.value.col(q).transpose();
-        for (int i = 0; i < 5; ++i)
-            stacked.row(6 * q + 1 + i) = (i < 2 ? table.d[i] : table.dd[i - 2]).col(q).transpose();
+        auto rows = stacked.middleRows<6>(6 * q).leftCols(table.functions());
+        rows.row(0) = table.value.col(q).transpose();
+        for (int i = 0; i < 5; ++i) rows.row(1 + i) = (i < 2 ? table.d[i] : table.dd[i - 2]).col(q).transpose();
     }
 }
 
 Eigen::MatrixX3d DiscreteEnergy::Rule::at(const CellColumns<3>& X) const {
+    Rows<3> nodes = Rows<3>::Zero();
+    nodes.leftCols(X.cols()) = X;
     Eigen::MatrixX3d out(stacked.rows(), 3);
-    for (int i = 0; i < 3; ++i) out.col(i).noalias() = stacked * X.row(i).transpose();
+    for (int i = 0; i < 3; ++i) out.col(i).noalias() = stacked * nodes.row(i).transpose();
     return out;
 }
 
@@ -419,15 +409,13 @@ void DiscreteEnergy::set_penalty(const CurvedMesh& mesh, const Bending& bending)
 void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, const Bending& bending,
                                 const std::optional<Formula>& potential, double sigma, double lambda,
                                 const Eigen::VectorXd& H0, int cell, Block& out) const {
-    const CellColumns<3> X = cell_nodes(mesh, cell), by_stretch = stretch_of(X),
-                         *stretch = d.stretch ? &by_stretch : nullptr;
-    const bool derive = d.normal.cols() > 0;
-    const CellColumns<3> D = derive ? space_.gather<3>(d.normal, cell) : CellColumns<3>();
+    const CellColumns<3> X = cell_nodes(mesh, cell);
+    const Moves moves = moves_of(space_, d, cell, X);
     const Tabulation& table = rule_.table;
     const Eigen::MatrixX3d at = rule_.at(X);
-    const int n = space_.width();
+    const int n = space_.width(), m = moves.all;
     std::optional<SecondDerivatives> second;
-    if (out.second.size() > 0) second.emplace(D, stretch, table, 3);
+    if (out.second.size() > 0) second.emplace(moves, table.points(), 3);
     for (int q = 0; q < table.points(); ++q) {
         const Point p(at.middleRows<6>(6 * q));
         const double weight = table.weight[q], dS = weight * p.area,
@@ -441,49 +429,49 @@ void DiscreteEnergy::cell_block(const CurvedMesh& mesh, const Directions& d, con
         Eigen::Vector3d from = p.x;
         if (mesh.period > 0) from.z() = 0;
         out.values.volume += third * dS * from.dot(p.normal);
-        if (!derive) continue;
-        const Change change(p, D, stretch, table, q);
+        if (m == 0) continue;
+        const auto functions = rule_.stacked.middleRows<5>(6 * q + 1);
+        const Change change(p, moves, functions);
         const Curvatures<Invariant> jets = p.curvature_jets();
         const Invariant energy = chain(jets.H, jets.K, F.f, F.H, F.K, F.HH, F.HK, F.KK) * jets.area;
         const Eigen::Matrix<double, 4, 6> J = p.slopes();
-        const Rows<1> widens = dS * change.area();
-        const Rows<3> moved = moved_by(D, stretch, table.value.col(q));
-        out.energy += (weight * J.transpose() * gradient(energy)).transpose().lazyProduct(change.forms);
-        out.area += widens;
-        out.M +=
-            (weight * J.transpose() * gradient(Invariant(jets.H * jets.area))).transpose().lazyProduct(change.forms);
-        out.volume.head(n) += dS * p.normal.transpose().lazyProduct(moved.leftCols(n));
-        const Rows<1> climbs = W.slope.transpose() * moved;
-        if (potential) out.energy += W.value * widens + dS * climbs;
-        if (!second && !stretch) continue;
-        Rows<3> turned = turned_by(p, D, stretch, table, q);
-        if (stretch) out.volume[n] += weight * 0.5 * from.dot(turned.col(n));
+        const auto in_forms = [&](const Invariant& f) -> Vector6 { return weight * J.transpose() * gradient(f); };
+        const Rows<1> widens = dS * change.area(), by_energy = in_forms(energy).transpose().lazyProduct(change.forms),
+                      by_M = in_forms(jets.H * jets.area).transpose().lazyProduct(change.forms);
+        const Rows<3> moved = moves.by(rule_.stacked.row(6 * q));
+        const Rows<1> climbs = W.slope.transpose() * moved, sweeps = dS * p.normal.transpose() * moved;
+        out.energy += by_energy.head(m), out.area += widens.head(m), out.M += by_M.head(m);
+        out.volume.head(n) += sweeps.head(n);
+        if (potential) out.energy += (W.value * widens + dS * climbs).head(m);
+        if (!second && m == n) continue;
+        Rows<3> turned = turned_by(p, moves, functions);
+        if (m > n) out.volume[n] += weight * 0.5 * from.dot(turned.col(n));
         if (!second) continue;
         const Invariant all = energy + (sigma + W.value) * jets.area;
-        second->add(p, change, weight * J.transpose() * gradient(all), weight * p.second_in_forms(J, all), q);
-        if (potential)
-            out.second +=
-                dS * moved.transpose() * W.second * moved + widens.transpose() * climbs + climbs.transpose() * widens;
+        second->add(p, change, in_forms(all), weight * p.second_in_forms(J, all), functions);
+        if (potential) {
+            const Own part = 0.5 * dS * moved.transpose() * W.second * moved + widens.transpose() * climbs;
+            out.second += (part + part.transpose()).topLeftCorner(m, m);
+        }
         turned *= weight * lambda;
-        if (stretch) {  // a moving end is no part of the surface: the volume is linear in the stretch
+        Rows<3> swept = moved;
+        if (m > n) {  // a moving end is no part of the surface: the volume is linear in the stretch
             const Rows<1> part = turned.col(n).transpose() * moved;
             out.second.row(n).head(n) += part.head(n), out.second.col(n).head(n) += part.head(n).transpose();
-            turned.col(n).setZero();
+            turned.col(n).setZero(), swept.col(n).setZero();
         }
-        Rows<3> swept = moved;
-        if (stretch) swept.col(n).setZero();
-        second->products.add(swept, 0.5 * turned);
+        second->products.add(swept, Rows<3>(0.5 * turned));
     }
-    if (second) out.second += second->sum();
+    if (second) out.second += second->sum().topLeftCorner(m, m);
 }
 
 // Two triangles beside an edge, the left one first.
 struct DiscreteEnergy::EdgeSides {
     const Rule* rule[2];
-    CellColumns<3> X[2], D[2], stretch[2];  // nodes, their directions and stretch, empty where not asked for
+    CellColumns<3> X[2];
+    Moves moves[2];
     Eigen::RowVectorXd H0[2];
 
-    const CellColumns<3>* stretched(int s) const { return stretch[s].cols() > 0 ? &stretch[s] : nullptr; }
     double H0_at(int s, int q, const Bending& bending) const {
         return H0[s].size() > 0 ? H0[s].dot(rule[s]->table.value.col(q).transpose()) : bending.H0;
     }
@@ -516,16 +504,15 @@ struct DiscreteEnergy::EdgeSums {
     SecondDerivatives own[2];
     Products cross;
 
-    explicit EdgeSums(const EdgeSides& at)
-        : own{{at.D[0], at.stretched(0), at.rule[0]->table, 10}, {at.D[1], at.stretched(1), at.rule[1]->table, 4}},
-          cross(5 * at.rule[0]->table.points(), at.D[0].cols() + (at.stretched(0) != nullptr)) {}
+    explicit EdgeSums(const EdgeSides& at, int points)
+        : own{{at.moves[0], points, 10}, {at.moves[1], points, 4}}, cross(5 * points) {}
     void add_to(Square& out) const {
-        const Square left = own[0].sum(), right = own[1].sum(), between = cross.sum();
+        const Own left = own[0].sum(), right = own[1].sum(), between = cross.sum();
         const Eigen::Index n = out.cols() / 2;
         out.topLeftCorner(n, n) += left.topLeftCorner(n, n), out.block(n, n, n, n) += right.topLeftCorner(n, n);
         out.block(0, n, n, n) += between.topLeftCorner(n, n);
         out.block(n, 0, n, n) += between.topLeftCorner(n, n).transpose();
-        if (left.cols() == n) return;
+        if (out.cols() == 2 * n) return;
         Row last(2 * n + 1);
         last << left.row(n).head(n) + between.col(n).head(n).transpose(), right.row(n).head(n) + between.row(n).head(n),
             left(n, n) + right(n, n) + 2 * between(n, n);
@@ -540,12 +527,11 @@ void DiscreteEnergy::edge_block(const CurvedMesh& mesh, const Directions& d, con
     for (int s = 0; s < 2; ++s) {
         at.X[s] = cell_nodes(mesh, e.cell[s]), at.rule[s] = &(s == 0 ? left_ : right_)[e.side[s]];
         if (H0.size() > 0) at.H0[s] = space_.gather(H0, e.cell[s]).transpose();
-        if (derive) at.D[s] = space_.gather<3>(d.normal, e.cell[s]);
-        if (d.stretch) at.stretch[s] = stretch_of(at.X[s]);
+        at.moves[s] = moves_of(space_, d, e.cell[s], at.X[s]);
     }
     const Bending powers = derive ? powers_alone(bending) : Bending();
     std::optional<EdgeSums> second;
-    if (out.second.size() > 0) second.emplace(at);
+    if (out.second.size() > 0) second.emplace(at, left_[0].table.points());
     const Eigen::MatrixX3d left = at.rule[0]->at(at.X[0]), right = at.rule[1]->at(at.X[1]);
     const Tabulation& table = at.rule[0]->table;
     for (int q = 0; q < table.points(); ++q) {
@@ -581,14 +567,14 @@ void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, co
                 weight * penalty * ds * a * a.transpose() + by_both * (a * l.transpose() + l * a.transpose()));
     const auto spread = [&](int s, const Rows<1>& row, Row& into) {
         into.segment(s * n, n) += row.head(n);
-        if (row.size() > n) into[2 * n] += row[n];
+        if (into.size() > 2 * n) into[2 * n] += row[n];
     };
     Rows<1> moments[2], halves[2];  // halves: of M
     Rows<3> tangents[3];            // along the edge, which both share; across it on the left, on the right
     for (int s = 0; s < 2; ++s) {
-        const Tabulation& table = at.rule[s]->table;
+        const auto functions = at.rule[s]->stacked.middleRows<5>(6 * q + 1);
         const Point& point = p.side[s];
-        const Change change(point, at.D[s], at.stretched(s), table, q);
+        const Change change(point, at.moves[s], functions);
         const Curvatures<Invariant> jets = point.curvature_jets();
         const MomentDerivatives F = moment_derivatives(bending, powers, p.H0[s], jets.H.v, jets.K.v);
         const Invariant moment =
@@ -598,23 +584,24 @@ void DiscreteEnergy::add_derivatives(const EdgeSides& at, const EdgePoint& p, co
         moments[s] = by_forms.transpose().lazyProduct(change.forms);
         const int first = s == 0 ? 0 : 2, last = s == 0 ? 1 : 2;
         Rows<1> own = by_moment * moments[s];
-        halves[s] = Rows<1>::Zero(own.size());
+        halves[s].setZero();
         for (int i = first; i <= last; ++i) {
-            tangents[i] = moved_by(at.D[s], at.stretched(s), table.d[i == 0 ? 0 : 1].col(q));
+            tangents[i] = at.moves[s].by(functions.row(i == 0 ? 0 : 1));
             own += energy.segment<3>(3 * i).lazyProduct(tangents[i]);
             halves[s] += 0.5 * M.segment<3>(3 * i).lazyProduct(tangents[i]);
         }
         spread(s, own, out.energy), spread(s, 2 * halves[s], out.M);
         if (!second) continue;
         SecondDerivatives& sums = second->own[s];
-        sums.add(point, change, by_moment * by_forms, by_moment * point.second_in_forms(in_forms, moment), q);
+        sums.add(point, change, by_moment * by_forms, by_moment * point.second_in_forms(in_forms, moment), functions);
         for (int i = first; i <= last; ++i)
-            sums.products.add(tangents[i], 0.5 * corner.block<3, 3>(3 * i, 3 * i) * tangents[i]);
+            sums.products.add(tangents[i], Rows<3>(0.5 * corner.block<3, 3>(3 * i, 3 * i) * tangents[i]));
         sums.products.add(moments[s], halves[s]);
     }
     if (!second) return;
-    second->own[0].products.add(tangents[0], corner.block<3, 3>(0, 3) * tangents[1]);
-    second->cross.add(corner.block<3, 3>(6, 0) * tangents[0] + corner.block<3, 3>(6, 3) * tangents[1], tangents[2]);
+    second->own[0].products.add(tangents[0], Rows<3>(corner.block<3, 3>(0, 3) * tangents[1]));
+    second->cross.add(Rows<3>(corner.block<3, 3>(6, 0) * tangents[0] + corner.block<3, 3>(6, 3) * tangents[1]),
+                      tangents[2]);
     second->cross.add(moments[0], halves[1]), second->cross.add(halves[0], moments[1]);
 }
 

@@ -75,10 +75,10 @@ private:
         int cell[2], side[2];
         double penalty = 0;
     };
-    // Functions at the points of a rule, and a matrix of their values and derivatives, six rows a point.
+    // Functions at the points of a rule; and their values and derivatives, six rows a point, zeros after the last.
     struct Rule {
         Tabulation table;
-        Eigen::MatrixXd stacked;
+        Eigen::Matrix<double, Eigen::Dynamic, max_cell_nodes + 1, Eigen::RowMajor> stacked;
 
         explicit Rule(Tabulation functions);
         Eigen::MatrixX3d at(const CellColumns<3>& X) const;

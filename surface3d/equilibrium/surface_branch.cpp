@@ -87,8 +87,8 @@ public:
             const double apart = std::abs(better.values.energy - e.values.energy) / e.reference_energy;
             e.estimated_error = std::max(e.estimated_error, found ? apart : better.estimated_error);
         }
-        e.spectrum = system_.spectrum(u, std::max(settings_.modes, 1));
-        e.wave_numbers = system_.wave_numbers(u, e.spectrum.vectors.topRows(e.mesh.size()));
+        e.spectrum = system_.spectrum(u, settings_.modes);
+        if (settings_.modes > 0) e.wave_numbers = system_.wave_numbers(u, e.spectrum.vectors.topRows(e.mesh.size()));
         return e;
     }
 

@@ -120,10 +120,11 @@ private:
 
     SurfaceEquilibrium finish(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         try {
-            out_.spectrum = system.spectrum(u, std::max(settings_.modes, 1));
+            out_.spectrum = system.spectrum(u, settings_.modes);
             if (before_ && before_->eigenvalues.size() == out_.spectrum.values.size())
                 out_.spectrum.errors = error_since(before_->eigenvalues, out_.spectrum.values);
-            out_.wave_numbers = system.wave_numbers(u, out_.spectrum.vectors.topRows(out_.mesh.size()));
+            if (settings_.modes > 0)
+                out_.wave_numbers = system.wave_numbers(u, out_.spectrum.vectors.topRows(out_.mesh.size()));
         } catch (const SolveError& error) {
             return end(Stop::solver_failed, fmt::format("the second variation: {}", error.what()));
         }

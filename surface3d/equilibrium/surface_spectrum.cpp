@@ -117,6 +117,13 @@ int count_negative(const ConstrainedForm& A, const Ordering& ordering, double sc
 
 SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ordering, int count, double scale) {
     const Eigen::Index n = A.form.rows();
+    if (count == 0) try {
+            SurfaceSpectrum out;
+            out.negative = count_negative(A, ordering, scale);
+            return out;
+        } catch (const SolveError&) {
+            count = 1;
+        }
     count = static_cast<int>(std::min<Eigen::Index>(count, n - 1 - A.constraints.cols()));
     double shift = -scale;
     std::optional<std::pair<Shifted, double>> low;

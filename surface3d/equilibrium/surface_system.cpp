@@ -483,8 +483,14 @@ int SurfaceSystem::index(const Eigen::VectorXd& u) const {
 }
 
 Eigen::VectorXd SurfaceSystem::way_down(const Eigen::VectorXd& u) const {
-    const SurfaceSpectrum s = spectrum(u, 1);
-    if (s.values[0] > -1e-6 * stiffness(u)) return {};
+    const ConstrainedForm A = second_variation(u);
+    const double scale = stiffness(u), level = -1e-6 * scale;
+    try {
+        if (count_below(A, ordering_, level) == 0) return {};
+    } catch (const SolveError&) {  // no factors without pivoting
+    }
+    const SurfaceSpectrum s = lowest_eigenvalues(A, ordering_, 1, scale);
+    if (s.values[0] > level) return {};
     return s.vectors.col(0);
 }
 
