@@ -7,13 +7,23 @@ set(precompiled_headers
   <Eigen/Dense> <Eigen/SparseCore>)
 
 # tubule_precompile(target [header...]): these, and further ones that this target uses throughout. Targets whose compile
-# flags and definitions agree share what was compiled for tubule_axisym; those that see toml++ have a definition more.
+# flags and definitions agree share what was compiled for tubule_common.
 function(tubule_precompile target)
-  get_target_property(libraries ${target} LINK_LIBRARIES)
-  if(target STREQUAL tubule_axisym OR ARGN OR tomlplusplus::tomlplusplus IN_LIST libraries)
+  if(target STREQUAL tubule_common OR ARGN)
     target_precompile_headers(${target} PRIVATE ${precompiled_headers} ${ARGN})
   else()
-    target_precompile_headers(${target} REUSE_FROM tubule_axisym)
+    target_precompile_headers(${target} REUSE_FROM tubule_common)
+  endif()
+endfunction()
+
+# tubule_no_kernels(target [header...]): a target that computes little itself, so that compiling it costs more than it
+# could gain: optimised little. Those that see toml++ share what was compiled for tubule_case.
+function(tubule_no_kernels target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  if(target STREQUAL tubule_case OR ARGN)
+    target_precompile_headers(${target} PRIVATE ${precompiled_headers} ${ARGN})
+  else()
+    target_precompile_headers(${target} REUSE_FROM tubule_case)
   endif()
 endfunction()
 
@@ -27,6 +37,7 @@ function(tubule_compile_together target)
   foreach(source IN LISTS sources)
     cmake_path(GET source PARENT_PATH folder)
     if(folder IN_LIST of_FOLDERS)
+      string(REPLACE / _ folder ${folder})
       set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder})
     endif()
   endforeach()
