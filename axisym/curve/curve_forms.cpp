@@ -301,7 +301,9 @@ double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& 
                    (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
         }
     const double kg = weights.energy * bending_.kg;
-    return images_ * stdx::reduce(sum) + (kg != 0 ? kg * gradients_->stretch_slope(x.data()) : 0);
+    const double of_places = W_ && weights.energy != 0 ? potential_stretch(space_, *W_, x.data()) : 0;
+    return images_ * stdx::reduce(sum) + weights.energy * of_places +
+           (kg != 0 ? kg * gradients_->stretch_slope(x.data()) : 0);
 }
 
 namespace {

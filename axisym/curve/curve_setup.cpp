@@ -103,6 +103,26 @@ CurveLaw law_of(const Problem& c) {
     return law;
 }
 
+namespace {
+
+// A tube has formulas of its period, in equilibrium mirror-symmetric ones, since half a tube stands for the whole.
+void require_tube_fields(const Problem& c, const Curve& shape) {
+    for (const Potential& p : c.energy.potentials) {
+        require_period(c, "energy.potential", *p.formula, shape.length);
+        for (int i = 1; i <= 24 && shape.topology == Topology::half_tube; ++i) {
+            const double z = 0.0203 * shape.length * i, r = 0.6 + 0.07 * i, place[]{r, z}, mirrored[]{r, -z},
+                         here = evaluate(*p.formula, place), there = evaluate(*p.formula, mirrored);
+            if (std::abs(there - here) > 1e-6 * (1 + std::abs(here)))
+                throw complaint(c, "energy.potential",
+                                fmt::format("must be mirror-symmetric as tubes in equilibrium are, but a formula is "
+                                            "{:.6g} at z = {:.4g} and {:.6g} at z = {:.4g}: try cosines",
+                                            here, z, there, -z));
+        }
+    }
+}
+
+}  // namespace
+
 void require_place(const Problem& c, const Curve& shape) {
     constexpr int points = 400;
     const std::vector<Potential>& potentials = c.energy.potentials;
@@ -114,8 +134,10 @@ void require_place(const Problem& c, const Curve& shape) {
             if (p.is_wall()) distance = std::min(distance, p.distance(at[0], at[2]));
     }
     const bool tube = shape.topology == Topology::tube || shape.topology == Topology::half_tube;
-    const bool closed = !tube || shape.length == 0;  // a torus
-    require_place(c, closed, bending_energy(shape, c.energy).potential, distance);
+    const bool walls = std::ranges::any_of(potentials, &Potential::is_wall);
+    const bool periodic = tube && shape.length > 0;  // no torus
+    if (periodic && !walls) require_tube_fields(c, shape);
+    require_place(c, !(periodic && walls), bending_energy(shape, c.energy).potential, distance);
 }
 
 double bead_distance(const Problem& c, const Curve& shape) {

@@ -51,13 +51,15 @@ PotentialObservation observe_potential(const CurveSpace& space, const Formula& W
     constexpr double near = 4;  // ranges: farther away a wall hardly acts
     PotentialObservation out;
     const std::vector<double>& breaks = space.splines().breaks();
+    const bool mirrored = space.images() == 2;  // whose forces balance
     each_group(space, x, [&](int e, const auto& basis, const Local& at) {
         for (int q = 0; q < lanes; ++q) {
             using J = Jet<double, 2, 1>;
             const double r = at.v[0][0][q], z = at.v[1][0][q], speed = std::hypot(at.v[0][1][q], at.v[1][1][q]);
             const J place[]{J::variable(r, 0), J::variable(z, 1), J(p_at)}, value = evaluate(W, place);
             const double dS = space.images() * basis.weight[q] * 2 * pi * r * speed;
-            out.energy += value.v * dS, out.magnitude += std::abs(value.v) * dS, out.force -= value.d[1] * dS;
+            out.energy += value.v * dS, out.magnitude += std::abs(value.v) * dS,
+                out.force -= mirrored ? 0 : value.d[1] * dS;
             for (const Potential& p : potentials) {
                 if (!p.is_wall()) continue;
                 const double distance = p.distance(r, z), size = speed * (breaks[e + 1] - breaks[e]) / p.range;
@@ -92,6 +94,14 @@ int elements_for(std::span<const Potential> potentials, double length) {
     for (const Potential& p : potentials)
         if (p.is_wall()) out = std::max(out, std::ceil(2 * length / p.range));
     return static_cast<int>(std::min(out, 1e6));
+}
+
+double potential_stretch(const CurveSpace& space, const Formula& W, const double* x) {
+    Pack sum{0.0};
+    each_group(space, x, [&](int, const auto& basis, const Local& at) {
+        sum += load(basis.weight) * density<1>(W, at, 0).d[3] * at.v[1][1];
+    });
+    return space.images() * stdx::reduce(sum);
 }
 
 void add_potential_gradient(const CurveSpace& space, const Formula& W, double weight, const double* x, double* out,

@@ -30,6 +30,10 @@ FormulaDomain::Margin potential_domain(const CurveSpace& space, std::span<const 
 // one.
 int elements_for(std::span<const Potential> potentials, double length);
 
+// The derivative of INT W dS as a tube is drawn out along its axis and each point keeps its W: of the axial force, the
+// mean over the sections.
+double potential_stretch(const CurveSpace& space, const Formula& W, const double* x);
+
 // The gradient, added to space.size() numbers.
 void add_potential_gradient(const CurveSpace& space, const Formula& W, double weight, const double* x, double* out,
                             double p = 0);

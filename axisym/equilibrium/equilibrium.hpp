@@ -89,7 +89,7 @@ private:
     // Nothing but an equation holds a whole cell in its place.
     bool drifts() const {
         return space_->topology() == Topology::cell &&
-               std::ranges::none_of(problem_.bending.potentials, &Potential::acts);
+               std::ranges::none_of(problem_.bending.potentials, &Potential::acts_along_axis);
     }
     void set_constraints(const CurveObservation& o, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     Weights weights(const Eigen::VectorXd& u) const;

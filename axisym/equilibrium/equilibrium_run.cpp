@@ -78,7 +78,14 @@ Task task_of(const Problem& c) {
     Task task;
     try {
         task.start = initial_curve(c);
-        if (task.start.topology == Topology::tube) task.start = half(task.start);
+        if (task.start.topology == Topology::tube) {
+            const double z = task.start.at(0)[2];
+            if (std::ranges::any_of(c.energy.potentials, &Potential::acts_along_axis) &&
+                std::abs(z) > 1e-9 * task.start.length)
+                throw complaint(c, "shape",
+                                fmt::format("must begin at z = 0 where a potential depends on z, not {:.4g}", z));
+            task.start = half(task.start);
+        }
     } catch (const std::invalid_argument& error) {
         throw CaseError(fmt::format("{}: shape: {}", c.path, error.what()));
     }

@@ -542,8 +542,9 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, const Splin
         fix_at_rings(field, fixed);
         return fixed;
     }
-    const std::vector<Potential>& potentials = problem_.bending.potentials;  // hold it in its place, but along planes
-    const bool free = std::ranges::none_of(potentials, &Potential::acts);
+    // They hold it in its place, but along planes, and along the axis where they do not depend on z.
+    const std::vector<Potential>& potentials = problem_.bending.potentials;
+    const bool free = std::ranges::none_of(potentials, m == 0 ? &Potential::acts_along_axis : &Potential::acts);
     const bool planes =
         std::ranges::all_of(potentials, [](const Potential& p) { return p.kind == Potential::Kind::plane; });
     const Eigen::LDLT<Matrix> projection(forms.mass);

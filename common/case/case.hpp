@@ -182,7 +182,7 @@ struct Case {
 inline bool can_be_graph(const Case& c) {
     const MotionLaw law = motion_law(c.model);
     return is_tube(c.shape) && law.unconstrained() && !law.loads_change() && !law.pressure_of_volume &&
-           !c.energy.H0_varies() && !c.energy.alpha;
+           !c.energy.H0_varies() && !c.energy.alpha && c.energy.potentials.empty();
 }
 // Whether it is, unless the profile overhangs.
 inline bool begins_as_graph(const Case& c) {

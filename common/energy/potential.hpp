@@ -28,6 +28,8 @@ struct Potential {
     std::shared_ptr<const Formula> formula = {};
 
     bool is_wall() const { return kind != Kind::formula; }
+    // Whether it holds a membrane in its place along the axis, in tier axisym.
+    bool acts_along_axis() const { return is_wall() ? strength != 0 : uses(*formula, 1); }
     bool acts() const { return !is_wall() || strength != 0; }
     // From the wall to a point, negative behind it.
     double distance(double r, double z) const;

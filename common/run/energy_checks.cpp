@@ -116,25 +116,26 @@ void refuse_to_deform(const Problem& c) {
     if (c.law.source.act()) throw complaint(c, "model.source", why);
 }
 
+void require_period(const Problem& c, const char* key, const Formula& formula, double period) {
+    for (int i = 0; i < 24; ++i) {
+        const double z = 0.037 * period * (i + 1), r = 0.6 + 0.07 * i, t = 0.11 * i;
+        const auto value = [&](double z) {
+            const double space[]{r, -0.3 * r, z, t}, plane[]{r, z, t};
+            return evaluate(formula, c.tier == Tier::surface3d ? space : plane);
+        };
+        const double here = value(z), next = value(z + period);
+        if (std::abs(next - here) > 1e-6 * (1 + std::abs(here)))
+            throw complaint(c, key,
+                            fmt::format("must have the period {0:.6g} of the tube along z, but a formula is {1:.6g} at "
+                                        "z = {2:.6g} and {3:.6g} at z = {4:.6g}: try functions of 2*pi*z/{0:.6g}",
+                                        period, here, z, next, z + period));
+    }
+}
+
 void require_periodic_sources(const Problem& c, double period) {
     const Sources& source = c.law.source;
-    const bool in_space = c.tier == Tier::surface3d;
-    const auto refuse = [&](double z, double value, double next) {
-        throw complaint(c, "model.source",
-                        fmt::format("must have the period {0:.6g} of the tube along z, but a formula is {1:.6g} at z = "
-                                    "{2:.6g} and {3:.6g} at z = {4:.6g}: try functions of 2*pi*z/{0:.6g}",
-                                    period, value, z, next, z + period));
-    };
     for (const auto& formula : {source.force[0], source.force[1], source.force[2], source.mass})
-        for (int i = 0; formula && i < 24; ++i) {
-            const double z = 0.037 * period * (i + 1), r = 0.6 + 0.07 * i, t = 0.11 * i;
-            const auto value = [&](double z) {
-                const double space[]{r, -0.3 * r, z, t}, plane[]{r, z, t};
-                return evaluate(*formula, in_space ? space : plane);
-            };
-            const double here = value(z), next = value(z + period);
-            if (std::abs(next - here) > 1e-6 * (1 + std::abs(here))) refuse(z, here, next);
-        }
+        if (formula) require_period(c, "model.source", *formula, period);
 }
 
 namespace {

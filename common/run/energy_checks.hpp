@@ -26,8 +26,8 @@ StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, co
 StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time);
 void require_pressure(const Problem& c, double volume);
 
-// CaseError where potentials of places do not suit the initial shape: a tube, an energy INT W dS that is not finite, a
-// point behind a wall (`distance` is the least one to a wall).
+// CaseError where potentials of places do not suit the initial shape: not closed, an energy INT W dS that is not
+// finite, a point behind a wall (`distance` is the least one to a wall).
 void require_place(const Problem& c, bool closed, double energy, double distance);
 
 // CaseError where beads have no place on the initial shape: none with two poles, or poles that are too near.
@@ -36,7 +36,8 @@ void require_beads(const Problem& c, bool closed, double distance);
 // CaseError for what would deform a sphere, or a straight tube with its period, of fixed area and volume: no other
 // shape has these, and no multiplier then holds the volume.
 void refuse_to_deform(const Problem& c);
-// Throws unless the sources of a tube have its period.
+// CaseError unless a formula of the place and of time, or the sources, have the period of a tube.
+void require_period(const Problem& c, const char* key, const Formula& formula, double period);
 void require_periodic_sources(const Problem& c, double period);
 
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or

@@ -27,6 +27,11 @@ Potential particle(double radius, double strength, double range) {
     return {.kind = Kind::sphere, .radius = radius, .strength = strength, .range = range};
 }
 
+Potential field(const std::string& formula) {
+    return {.kind = Kind::formula,
+            .formula = std::make_shared<const Formula>(parse_formula(formula, Potential::variables))};
+}
+
 // Each law has its minimum, -strength, at the distance `range`, on either side of a wall.
 TEST(Potential, hasItsMinimumAtTheRange) {
     for (const Law law : {Law::morse, Law::nine_three})
@@ -48,23 +53,83 @@ TEST(Potential, hasItsMinimumAtTheRange) {
 }
 
 TEST(Potential, formsHaveTheirDerivatives) {
-    const Potential wall{.z = -1.7, .strength = 0.4, .range = 0.3},
-        formula{.kind = Kind::formula,
-                .formula = std::make_shared<const Formula>(
-                    parse_formula("0.3*z*exp(-r^2) + 0.1*sin(z)", Potential::variables))};
+    const Potential wall{.z = -1.7, .strength = 0.4, .range = 0.3}, formula = field("0.3*z*exp(-r^2) + 0.1*sin(z)");
     Potential round = particle(0.4, 0.5, 0.2);
     round.z = 1.9, round.law = Law::nine_three;
-    const Bending energy = with_potentials(bending(0.2, -0.7, 0.03, 0.1), {wall, round, formula});
-    const CurveSpace space(Topology::cell, equal_breaks(8), 5, 4, 0);
-    const CurveForms forms(space, energy);
-    const Weights weights{.energy = 0.8, .area = 0.1, .volume = -0.2};
-    const auto checked = check_derivatives([&](const Eigen::VectorXd& x) { return forms.value(weights, x); },
-                                           [&](const Eigen::VectorXd& x) { return forms.gradient(weights, x); },
-                                           [&](const Eigen::VectorXd& x, const Eigen::VectorXd& w) -> Eigen::VectorXd {
-                                               return forms.hessian(weights, x) * w;
-                                           },
-                                           fit(space, meridian(Ellipsoid{1, 1, 1.3})));
-    EXPECT_TRUE(checked.pass()) << checked.text();
+    const Bending at_walls = with_potentials(bending(0.2, -0.7, 0.03, 0.1), {wall, round, formula});
+    const Curve closed = meridian(Ellipsoid{1, 1, 1.3}), tube = meridian(Tube{1.1, 3, {}});
+    const Bending in_tube = with_potentials(bending(0.2, -0.7), {field("0.3*r^2*cos(2*pi*z/3)")});
+    for (const auto& [shape, energy] : {std::pair(closed, at_walls), std::pair(tube, in_tube)}) {
+        const CurveSpace space(shape.topology, equal_breaks(8), 5, 4, shape.length);
+        const CurveForms forms(space, energy);
+        const Weights weights{.energy = 0.8, .area = 0.1, .volume = -0.2};
+        const auto checked =
+            check_derivatives([&](const Eigen::VectorXd& x) { return forms.value(weights, x); },
+                              [&](const Eigen::VectorXd& x) { return forms.gradient(weights, x); },
+                              [&](const Eigen::VectorXd& x, const Eigen::VectorXd& w) -> Eigen::VectorXd {
+                                  return forms.hessian(weights, x) * w;
+                              },
+                              fit(space, shape));
+        EXPECT_TRUE(checked.pass()) << checked.text();
+    }
+}
+
+// A straight tube in a field W(r), without tension: in equilibrium where k20/R^2 = W + R W', its waves stiffer by
+// W'' + W'/R than under the tension W. Nothing holds it along the axis.
+TEST(Potential, tubesInAField) {
+    const double k20 = 0.5, length = 3;
+    double R = 1;
+    const auto jet = [&](double r) { return std::array{0.3 + 0.4 * (r - 1.2) * (r - 1.2), 0.8 * (r - 1.2), 0.8}; };
+    for (int i = 0; i < 50; ++i) {
+        const auto [W, W1, W2] = jet(R);
+        R -= (W + R * W1 - k20 / (R * R)) / (2 * W1 + R * W2 + 2 * k20 / (R * R * R));
+    }
+    const auto [W, W1, W2] = jet(R);
+    const StationaryProblem problem{with_potentials(bending(k20), {field("0.3 + 0.4*(r - 1.2)^2")}), {}};
+    const Curve start = half(meridian(Tube{R + 0.1, length, {}}));
+    const Equilibrium e = find_equilibrium(problem, start, {.accuracy = 1e-10, .elements = 16});
+    ASSERT_EQ(e.stop, Stop::finished) << e.message;
+    EXPECT_NEAR(e.observed.r_max, R, 1e-8);
+    EXPECT_NEAR(e.observed.energy, 2 * pi * length * (k20 / R + R * W), 1e-8);
+    EXPECT_NEAR(axial_force(problem, e), 2 * pi * (k20 / R + R * W), 1e-8);
+    EXPECT_EQ(e.observed.potential.force, 0);
+    const MotionLaw flow{.friction = 1, .inextensible = false, .keeps_volume = false};
+    const theory::UniformTube tube{bending(k20), R, W};
+    for (int m = 0; m <= 2; ++m) {
+        std::vector<double> expected;
+        for (int n = 0; n <= 3; ++n)
+            expected.insert(expected.end(), n > 0 ? 2 : 1,
+                            -theory::stiffness(tube, m)(2 * pi * n / length) - W2 - W1 / R);
+        std::sort(expected.rbegin(), expected.rend());
+        const ModeRates found = ModeStability(problem, e).rates(m, flow, 4);
+        for (int i = 0; i < 4; ++i) EXPECT_NEAR(found.rates[i], expected[i], 1e-5 * std::abs(expected[i])) << m << i;
+    }
+}
+
+// A tube that a periodic field makes wavy: its end is the equilibrium, where dE/dL is the force; the energy balances.
+TEST(Potential, tubesFollowAPeriodicField) {
+    const std::string text =
+        "tier = \"axisym\"\n[energy]\nk20 = 0.5\n[[energy.potential]]\nkind = \"formula\"\nformula = "
+        "\"0.3*r^2 + 0.1*cos(2*pi*z/3)\"\n[model]\nkind = \"gradient-flow\"\narea = \"free\"\n"
+        "[shape]\nkind = \"tube\"\nradius = 0.8\nlength = 3\n[accuracy]\nenergy = 1e-6\n";
+    const auto run = [&](const std::string& more, const std::vector<std::string>& sets = {}) {
+        return run_case(parse_case(text + more, sets, "case.toml"));
+    };
+    const Outcome o = run("[time]\nend = 100\nstationary = 1e-9\n");
+    ASSERT_EQ(o.summary.stop.reason, Stop::stationary) << o.summary.stop.message;
+    EXPECT_GT(o.last("r_max"), 1.01 * o.last("r_min"));
+    for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-5 * o.summary.reference_energy);
+    const Outcome e = run_shapes(parse_case(text + "[equilibrium]\nheld = \"nothing\"\nmodes = 0\n", {}, "case.toml"));
+    ASSERT_EQ(e.summary.stop.reason, Stop::finished) << e.summary.stop.message;
+    EXPECT_NEAR(e.last("energy"), o.last("energy"), 1e-6 * o.summary.reference_energy);
+    EXPECT_NEAR(e.last("force"), o.last("force"), 1e-4 * e.last("force"));
+    EXPECT_LT(e.last("growth_0"), 0);
+    EXPECT_EQ(e.last("negative_directions"), 0);
+    const auto refusal = [&](const std::string& formula) {
+        return test::message_of<CaseError>(
+            [&] { run("[time]\nend = 1\n", {"energy.potential.0.formula=" + formula}); });
+    };
+    EXPECT_CONTAINS(refusal("cos(z)"), "must have the period 3 of the tube");
 }
 
 // A sphere about a particle: 16 pi k20 + 4 pi R^2 W, stationary where R W' + 2 W = 0; waves l of it cost, beside

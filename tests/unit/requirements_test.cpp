@@ -154,6 +154,9 @@ const std::vector<Refused> refused{
      {"shape={kind=\"sphere\", radius=1}", "energy.potential=[{kind=\"formula\", formula=\"z\"}]"},
      "tier = \"axisym\" or"},
     {axisym, {wall}, "a closed surface"},
+    {axisym,
+     {"model={area=\"fixed\", period=\"free\"}", "energy.potential=[{kind=\"formula\", formula=\"r\"}]"},
+     "model.period = \"fixed\""},
     {equilibrium, {"equilibrium.family=prolate", wall}, "a case without equilibrium.family"},
     {equilibrium, {"model.kind=stokes", wall}, "inertia or friction"},
 };
