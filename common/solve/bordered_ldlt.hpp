@@ -26,6 +26,7 @@ public:
     // After steps of iterative refinement.
     Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
 
+    Eigen::Index size() const { return whole_.rows(); }
     bool pivoted() const { return lu_.has_value(); }  // whether LU factors are in use
     // Negative eigenvalues of A; not where it is pivoted.
     int negative() const { return ldlt_->pivots().negative; }

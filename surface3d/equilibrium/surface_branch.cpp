@@ -87,7 +87,7 @@ public:
             const double apart = std::abs(better.values.energy - e.values.energy) / e.reference_energy;
             e.estimated_error = std::max(e.estimated_error, found ? apart : better.estimated_error);
         }
-        e.spectrum = system_.spectrum(u, settings_.modes);
+        e.spectrum = system_.modes(u, settings_.law, settings_.modes);
         if (settings_.modes > 0) e.wave_numbers = system_.wave_numbers(u, e.spectrum.vectors.topRows(e.mesh.size()));
         return e;
     }

@@ -113,14 +113,14 @@ private:
     void remember(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         before_ = {energy_of(system, u), out_.mesh.triangles(), {}};
         if (settings_.modes > 0) try {
-                before_->eigenvalues = system.spectrum(u, settings_.modes).values;
+                before_->eigenvalues = system.modes(u, settings_.law, settings_.modes).values;
             } catch (const SolveError&) {  // the errors remain unknown
             }
     }
 
     SurfaceEquilibrium finish(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         try {
-            out_.spectrum = system.spectrum(u, settings_.modes);
+            out_.spectrum = system.modes(u, settings_.law, settings_.modes);
             if (before_ && before_->eigenvalues.size() == out_.spectrum.values.size())
                 out_.spectrum.errors = error_since(before_->eigenvalues, out_.spectrum.values);
             if (settings_.modes > 0)

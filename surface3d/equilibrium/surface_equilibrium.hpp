@@ -18,7 +18,8 @@ struct SurfaceEquilibriumSettings {
     int max_triangles = 20000;  // more are never taken
     bool descend = true;        // look for a minimum; if not, for a stationary shape near the initial one
     bool near = false;          // the initial shape is an equilibrium of a nearby problem, or of the other tier
-    int modes = 0;              // lowest eigenvalues of the second variation with errors; one without is always found
+    int modes = 0;              // slowest ones with errors; one without is always found
+    MotionLaw law{.friction = 1, .inextensible = false, .keeps_volume = false};  // of the modes
 };
 
 struct SurfaceEquilibrium {
@@ -29,7 +30,7 @@ struct SurfaceEquilibrium {
     EnergyValues values;                               // E with area differences
     double reference_energy = 0, estimated_error = 1;  // the latter relative to the former
     int iterations = 0;                                // of Newton, over all meshes
-    // Spectrum of displacements along the normal, mass INT w^2 dS: minus its values are the rates of gradient flow.
+    // Spectrum of displacements along the normal: minus its values are the rates of the law.
     SurfaceSpectrum spectrum;
     std::vector<int> wave_numbers;  // of its vectors: see SurfaceSystem
     int held_motions = 0;

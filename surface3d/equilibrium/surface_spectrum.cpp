@@ -5,7 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "common/solve/bordered_ldlt.hpp"
 #include "common/solve/dense.hpp"
@@ -17,11 +21,12 @@ namespace {
 // Factors of [A - shift M, C, L; C^T, 0, 0; L^T, 0, -1/weights], and how many eigenvalues lie below the shift.
 class Shifted {
 public:
-    Shifted(const ConstrainedForm& A, const Ordering& ordering, double shift)
+    Shifted(const ConstrainedForm& A, const Ordering& ordering, double shift,
+            BorderedLdlt::Otherwise otherwise = BorderedLdlt::Otherwise::fail)
         : size_(A.form.rows()),
-          factors_(ordering, static_cast<int>(A.constraints.cols() + A.low_rank.cols()),
-                   BorderedLdlt::Otherwise::fail) {
+          factors_(ordering, static_cast<int>(A.constraints.cols() + A.low_rank.cols()), otherwise) {
         factors_.factor(bordered(A, shift));
+        if (factors_.pivoted()) return;
         negative_ = factors_.negative() - static_cast<int>(A.constraints.cols());
         if (factors_.complement().size() == 0) return;
         negative_ += static_cast<int>((eigenpairs(factors_.complement(), false).values.array() < 0).count());
@@ -31,11 +36,14 @@ public:
 
     int negative() const { return negative_; }
 
-    Eigen::VectorXd solve(const Eigen::VectorXd& b) const {
-        Eigen::VectorXd all = Eigen::VectorXd::Zero(size_ + factors_.complement().rows());
+    Eigen::VectorXd solve(const Eigen::VectorXd& b) const { return solve_all(b).head(size_); }
+    // With the multipliers of the constraints and of the parts of low rank after it.
+    Eigen::VectorXd solve_all(const Eigen::VectorXd& b) const {
+        Eigen::VectorXd all = Eigen::VectorXd::Zero(factors_.size());
         all.head(size_) = b;
-        return factors_.solve(all).head(size_);
+        return factors_.solve(all);
     }
+    bool pivoted() const { return factors_.pivoted(); }
 
 private:
     static Eigen::SparseMatrix<double> bordered(const ConstrainedForm& A, double shift) {
@@ -98,6 +106,102 @@ struct Mass {
         Eigen::Map<Eigen::VectorXd>(y, M.rows()) = M * Eigen::Map<const Eigen::VectorXd>(x, M.rows());
     }
 };
+
+// Columns w, and M w of each.
+struct Pairs {
+    Eigen::MatrixXd w, f;
+
+    void append(const Pairs& more) {
+        w.conservativeResize(more.w.rows(), w.cols() + more.w.cols()), w.rightCols(more.w.cols()) = more.w;
+        f.conservativeResize(more.f.rows(), f.cols() + more.f.cols()), f.rightCols(more.f.cols()) = more.f;
+    }
+    Pairs times(const Eigen::MatrixXd& c) const { return {w * c, f * c}; }
+    void leave_out(const Pairs& others) {
+        const Eigen::MatrixXd parts = others.f.transpose() * w;
+        w -= others.w * parts, f -= others.f * parts;
+    }
+};
+
+// Of norm 1 and orthogonal to others and to each other; fewer where some depend on the others. Times `factor` they are
+// what was given, but for what the others hold.
+std::pair<Pairs, Eigen::MatrixXd> orthonormal(Pairs of, const std::vector<const Pairs*>& others) {
+    const double before = of.w.cwiseProduct(of.f).colwise().sum().maxCoeff();
+    for (int k = 0; k < 2; ++k)
+        for (const Pairs* other : others)
+            if (other->w.cols() > 0) of.leave_out(*other);
+    Eigen::MatrixXd factor = Eigen::MatrixXd::Identity(of.w.cols(), of.w.cols());
+    for (int k = 0; k < 2; ++k) {
+        const Eigen::MatrixXd products = of.w.transpose() * of.f;
+        const Eigenpairs gram = eigenpairs((products + products.transpose()) / 2, true);
+        const Eigen::Index some = (gram.values.array() > (k == 0 ? 1e-14 * before : 0)).count();
+        if (some == 0) return {of.times(gram.vectors.leftCols(0)), factor.topRows(0)};
+        const Eigen::MatrixXd vectors = gram.vectors.rightCols(some);
+        const Eigen::VectorXd norms = gram.values.tail(some).cwiseSqrt();
+        of = of.times(vectors * norms.cwiseInverse().asDiagonal());
+        factor = (norms.asDiagonal() * vectors.transpose() * factor).eval();
+    }
+    return {of, factor};
+}
+
+// (A - shift M)^-1 M for pairs.
+struct InvertedFlow {
+    const FlowForm& flow;
+    const Shifted& factors;
+    double shift;
+
+    // What M w = f leads to.
+    Pairs operator()(const Eigen::MatrixXd& f) const {
+        const ConstrainedForm& A = flow.form;
+        const Eigen::Index all = A.form.rows(), stretch = flow.size - flow.nodes;
+        Pairs out{Eigen::MatrixXd(flow.size, f.cols()), Eigen::MatrixXd(flow.size, f.cols())};
+        for (Eigen::Index j = 0; j < f.cols(); ++j) {
+            Eigen::VectorXd b = Eigen::VectorXd::Zero(all);
+            b.head(flow.nodes) = f.col(j).head(flow.nodes), b.tail(stretch) = f.col(j).tail(stretch);
+            const Eigen::VectorXd x = factors.solve_all(b);
+            const Eigen::VectorXd drag = A.form * x.head(all) +
+                                         A.constraints.leftCols(flow.held) * x.segment(all, flow.held) +
+                                         A.low_rank * x.tail(A.low_rank.cols()) - b;
+            out.w.col(j) << x.head(flow.nodes), x.head(all).tail(stretch);
+            out.f.col(j) << drag.head(flow.nodes) / shift, drag.tail(stretch) / shift;
+        }
+        out.f -= flow.none * (flow.none.transpose() * out.f);
+        return out;
+    }
+};
+
+// The largest eigenvalues of the inverse, descending, on pairs orthogonal to those `found`, by a block of Lanczos'
+// method that grows until `count` of them are exact, or the first is below `least`; or until rounding might count. Then
+// `first` is where to go on.
+std::pair<Eigen::VectorXd, Pairs> largest_of(const InvertedFlow& inverse, const Pairs& found, int count, double least,
+                                             Eigen::MatrixXd& first) {
+    constexpr int most = 12;
+    Pairs basis, next = orthonormal(inverse(inverse(first).f), {&found}).first;
+    Eigen::MatrixXd T;
+    for (int step = 1;; ++step) {
+        check_pause();
+        const Eigen::Index before = T.rows(), more = next.w.cols();
+        basis.append(next);
+        Pairs image = inverse(next.f);
+        Eigen::MatrixXd factor;
+        T.conservativeResize(before + more, before + more);
+        T.rightCols(more) = basis.f.transpose() * image.w;
+        T.bottomRows(more) = T.rightCols(more).transpose().eval();
+        std::tie(next, factor) = orthonormal(std::move(image), {&found, &basis});
+        const Eigenpairs ritz = eigenpairs((T + T.transpose()) / 2, true);
+        const Eigen::VectorXd residuals = (factor * ritz.vectors.bottomRows(more)).colwise().norm();
+        const Eigen::VectorXd values = ritz.values.reverse();
+        const bool none = values[0] < (1 + 1e-6) * least && residuals.tail(1)[0] < 1e-3 * values[0];
+        Eigen::Index exact = 0;
+        while (exact < std::min<Eigen::Index>(count, values.size()) && !none &&
+               residuals.reverse()[exact] <= 1e-5 * std::abs(values[exact]))
+            ++exact;
+        if (!none && exact < count && step < most && next.w.cols() > 0) continue;
+        const Eigen::Index rest = std::min(values.size() - exact, first.cols());
+        first =
+            none || rest == 0 ? Eigen::MatrixXd() : basis.f * ritz.vectors.rowwise().reverse().middleCols(exact, rest);
+        return {values.head(exact), basis.times(ritz.vectors.rowwise().reverse().leftCols(exact))};
+    }
+}
 
 }  // namespace
 
@@ -162,6 +266,41 @@ SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ord
         out.doubt = fmt::format("the number of eigenvalues could not be counted: {}", error.what());
         out.negative = static_cast<int>((out.values.array() < 0).count());
     }
+    return out;
+}
+
+SurfaceSpectrum lowest_of_flow(const FlowForm& flow, int count, double scale) {
+    count = static_cast<int>(std::min<Eigen::Index>(count, flow.size / 4));
+    std::optional<Shifted> factors;
+    for (int k = 0;; ++k, scale *= 4) {
+        check_pause();
+        factors.emplace(flow.form, flow.ordering, -scale, BorderedLdlt::Otherwise::lu);
+        if (factors->pivoted() || factors->negative() == flow.multipliers) break;
+        if (k == 10) throw SolveError("the rates have no bound that could be found");
+    }
+    const InvertedFlow inverse{flow, *factors, -scale};
+    SurfaceSpectrum out;
+    if (factors->pivoted()) out.doubt = "the number of rates could not be counted";
+    // One block may miss some of several equal values: others follow until they find none.
+    constexpr int block = 4, most = 100;
+    Pairs found;
+    std::vector<std::pair<double, Eigen::Index>> order;
+    Eigen::MatrixXd first;
+    for (int round = 0;; ++round) {
+        if (round == most) throw SolveError("Lanczos' method for the slowest modes does not converge");
+        const bool enough = static_cast<int>(order.size()) >= count, fresh = first.cols() == 0;
+        if (fresh) first.resize(flow.size, block);
+        for (int j = 0; fresh && j < block; ++j)
+            first.col(j) = Eigen::VectorXd::LinSpaced(flow.size, 1, 2 + block * round + j).array().sin();
+        const auto [values, pairs] = largest_of(inverse, found, count, enough ? order[count - 1].first : 0, first);
+        if (enough && fresh && values.size() == 0 && first.cols() == 0) break;
+        for (Eigen::Index i = 0; i < values.size(); ++i) order.emplace_back(values[i], found.w.cols() + i);
+        found.append(pairs);
+        std::sort(order.begin(), order.end(), std::greater<>());
+    }
+    out.values.resize(count), out.vectors.resize(flow.size, count);
+    for (int i = 0; i < count; ++i)
+        out.values[i] = 1 / order[i].first - scale, out.vectors.col(i) = found.w.col(order[i].second);
     return out;
 }
 

@@ -31,6 +31,20 @@ struct SurfaceSpectrum {
 // shift can be factored, or Lanczos' method does not converge.
 SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ordering, int count, double scale);
 
+// The same for A w = value M w, where M w = f if x is w and what flows with it, mass x = f: theory.md (8.9). `form` is
+// A for all of x.
+struct FlowForm {
+    ConstrainedForm form;
+    Ordering ordering;
+    Eigen::Index nodes, size;  // w is the first `nodes` of x, and a stretch that is the last
+    Eigen::Index held;         // constraints of w, the first of `form`
+    int multipliers;           // of the others of x: as many negative eigenvalues
+    Eigen::MatrixXd none;      // displacements that cost nothing, orthonormal columns
+};
+// `scale`: a size of the values that are asked for. SolveError if no shift can be factored below all values, or
+// Lanczos' method does not converge.
+SurfaceSpectrum lowest_of_flow(const FlowForm& flow, int count, double scale);
+
 // Estimated errors of quantities that converge as the energy of triangles of this order, of which these are the values
 // on two meshes: half the order is counted on, since meshes are not alike.
 Eigen::VectorXd errors_between(const Eigen::VectorXd& coarse, int coarse_triangles, const Eigen::VectorXd& fine,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/solve/dense.hpp"
+#include "surface3d/equilibrium/surface_flow.hpp"
 #include "surface3d/fem/mesh_quality.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/meshing/remesh.hpp"
@@ -415,9 +416,8 @@ Eigen::VectorXd SurfaceSystem::unknowns_at_base() const {
     return u;
 }
 
-ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u) const {
+ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u, const Constraints& c) const {
     const EnergyDerivatives& d = derivatives(u);
-    const Constraints& c = problem_.constraints;
     const int N = space().size(), n = shape_size();
     ConstrainedForm A;
     const auto extended = [&](const Eigen::SparseMatrix<double>& M, bool form) {
@@ -471,6 +471,49 @@ double SurfaceSystem::stiffness(const Eigen::VectorXd& u) const {
 
 SurfaceSpectrum SurfaceSystem::spectrum(const Eigen::VectorXd& u, int count) const {
     return lowest_eigenvalues(second_variation(u), ordering_, count, stiffness(u));
+}
+
+// Velocities of those that cost no energy, numbered component by component, a column each; orthonormal.
+Eigen::MatrixXd SurfaceSystem::rigid_motions(const CurvedMesh& mesh) const {
+    const Middle middle(mesh);
+    const int n = mesh.size();
+    Eigen::MatrixXd all = Eigen::MatrixXd::Zero(3 * n, 6);
+    for (int i = 0; i < n; ++i) {
+        const Eigen::Vector3d x = (mesh.nodes[i] - middle.centre) / middle.size;
+        for (int k = 0; k < 3; ++k) {
+            const Eigen::Vector3d turn = Eigen::Vector3d::Unit(k).cross(x);
+            for (int d = 0; d < 3; ++d) {
+                all(d * n + i, k) = d == k;
+                if (mesh.period == 0 || k == 2) all(d * n + i, 3 + k) = turn[d];
+            }
+        }
+    }
+    all = (all * free_motions(mesh, problem_.bending, middle).topRows<6>()).eval();
+    const Eigenpairs gram = eigenpairs(all.transpose() * all, true);
+    const Eigen::Index none = (gram.values.array() <= 1e-8 * n).count(), some = all.cols() - none;
+    return all * gram.vectors.rightCols(some) * gram.values.tail(some).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+SurfaceSpectrum SurfaceSystem::modes(const Eigen::VectorXd& u, const MotionLaw& law, int count) const {
+    if (!law.inextensible || count == 0) return spectrum(u, count);
+    const EnergyDerivatives& d = derivatives(u);
+    // Where H is the same everywhere both are one constraint.
+    const double alike = std::abs(d.area.dot(d.volume)) / (d.area.norm() * d.volume.norm());
+    const bool one = !law.reservoir && 1 - alike < 1e-6;
+    Constraints held;
+    if (!law.reservoir) held.area = d.values.area;
+    if ((law.keeps_volume || problem_.constraints.volume) && !one) held.volume = d.values.volume;
+    ConstrainedForm A = second_variation(u, held);
+    SurfaceSpectrum still = lowest_eigenvalues(A, ordering_, count, stiffness(u));  // without what flows
+    A.constraints = A.constraints.rightCols(A.constraints.cols() - motions_.cols()).eval();
+    const CurvedMesh at = mesh(u);
+    const FlowForm flow = flow_form(A, space(), at, directions_.normal, law, rigid_motions(at));
+    // That of a sphere has modes of this friction, or less.
+    const double drag = law.friction + 16 * pi * law.viscosity / d.values.area;
+    SurfaceSpectrum out = lowest_of_flow(flow, count, still.values.cwiseAbs().maxCoeff() / drag);
+    out.negative = index(u);
+    if (out.doubt.empty()) out.doubt = std::move(still.doubt);
+    return out;
 }
 
 int SurfaceSystem::index(const Eigen::VectorXd& u) const {

@@ -80,6 +80,9 @@ public:
     EnergyValues values(const Eigen::VectorXd& u) const;
     // The second variation under what is held, of displacements that are no held motion; `count` lowest.
     SurfaceSpectrum spectrum(const Eigen::VectorXd& u, int count) const;
+    // The slowest modes of a law, minus their rates as values: of gradient flow those above, else of the flow that
+    // follows, which keeps what the law keeps.
+    SurfaceSpectrum modes(const Eigen::VectorXd& u, const MotionLaw& law, int count) const;
     // Its negative directions alone.
     int index(const Eigen::VectorXd& u) const;
     // The wave number m around the axis of a surface of revolution of each displacement of the nodes, one column each,
@@ -95,7 +98,11 @@ private:
     void set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const;
     const EnergyDerivatives& derivatives(const Eigen::VectorXd& u) const;
     const EnergyValues& sums(const Eigen::VectorXd& u) const;  // without area differences
-    ConstrainedForm second_variation(const Eigen::VectorXd& u) const;
+    ConstrainedForm second_variation(const Eigen::VectorXd& u, const Constraints& held) const;
+    ConstrainedForm second_variation(const Eigen::VectorXd& u) const {
+        return second_variation(u, problem_.constraints);
+    }
+    Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
     double stiffness(const Eigen::VectorXd& u) const;  // a size of its eigenvalues
     bool take_new_mesh(const CurvedMesh& shape, int triangles, Eigen::VectorXd& u, Eigen::VectorXd* along);
     void set_mesh(const CurvedMesh& mesh);

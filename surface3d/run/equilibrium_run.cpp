@@ -45,6 +45,7 @@ Task task_of(const Problem& c, const Start& start) {
     s.first_triangles = std::max(s.first_triangles, triangles_for_places(c.energy.potentials, c.law.beads, v.area));
     s.near = std::holds_alternative<ResultFrame>(c.shape);
     s.modes = c.equilibrium->rates.value_or(0);
+    if (s.modes > 0) s.law = c.law;
     if (!start.resizable())
         s.triangles = mesh.triangles();
     else

@@ -49,6 +49,11 @@ TEST(SurfaceEquilibrium, prolateOfTheAxisymmetricTier) {
     EXPECT_LT(e.spectrum.errors[0], 0.2);
     EXPECT_EQ(e.wave_numbers[0], 1);
     EXPECT_EQ(e.wave_numbers[1], 1);
+    // Its slowest mode where friction and inextensibility resist, m = 0.
+    SurfaceSystem system(e.mesh, vesicle(0.8));
+    Eigen::VectorXd u = system.unknowns_at_base();
+    u[system.sigma()] = e.sigma, u[system.lambda()] = e.lambda;
+    EXPECT_NEAR(system.modes(u, {.friction = 1}, 1).values[0], 10.94902, 0.05);
 }
 
 TEST(SurfaceEquilibrium, aVolumeThatNoShapeHasIsRefused) {
@@ -202,6 +207,24 @@ TEST(SurfaceEquilibrium, beadsNeedFineMeshes) {
     const SurfaceEquilibrium e = find_equilibrium(problem, make, {.triangles = 80});
     EXPECT_EQ(e.stop, Stop::resolution_lost);
     EXPECT_CONTAINS(e.message, "times model.bead_width apart");
+}
+
+// Exact: theory.md (6.5), (6.6), 2 l + 1 times each, under a pressure; friction, viscosity, or both resist.
+TEST(SurfaceFlow, sphere) {
+    const Bending bending{.k = {0.5, 0.02, 0.06}, .H0 = -0.3};
+    const theory::UniformSphere sphere{bending};
+    StationaryProblem problem{bending, {}};
+    problem.loads.pressure = theory::pressure_at_rest(sphere);
+    SurfaceSystem system(spheroid(80, 1, 1), problem);
+    Eigen::VectorXd u = system.unknowns_at_base();
+    int iterations = 0;
+    ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
+    for (const MotionLaw& law : {MotionLaw{.friction = 0.8}, MotionLaw{.viscosity = 0.5, .friction = 0.3},
+                                 MotionLaw{.viscosity = 0.5, .friction = 0}}) {
+        const SurfaceSpectrum s = system.modes(u, law, 5);
+        EXPECT_EQ(s.doubt, "");
+        for (int i = 0; i < 5; ++i) EXPECT_NEAR(s.values[i] / -theory::growth(sphere, law, 2).rate(), 1, 6e-3) << i;
+    }
 }
 
 // Waves of a straight tube under tension and pressure, two each (four with m > 0): theory.md (5.8).

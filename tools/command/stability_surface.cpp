@@ -33,6 +33,7 @@ Problem problem_of(const StabilityOptions& options, const StabilitySubject& subj
     e.branch = {};
     e.rates = options.rates.value_or(10);
     c.time = {}, c.velocity = {}, c.expect = {};
+    if (c.model.kind == ModelKind::fluid) c.model.kind = ModelKind::stokes;
     CaseInputs inputs;
     if (subject.frame) {
         const ResultFrame frame{.path = std::filesystem::path(options.file).filename().string(),
@@ -42,7 +43,9 @@ Problem problem_of(const StabilityOptions& options, const StabilitySubject& subj
         e.descend = false;
         inputs = {frame_as_input(frame, *subject.result)};
     }
-    return parse_case(effective_toml(c), {}, c.path, inputs);
+    Problem out = parse_case(effective_toml(c), {}, c.path, inputs);
+    out.law.inextensible = out.law.keeps_volume = false;  // the modes are those of gradient flow
+    return out;
 }
 
 SurfaceModes modes_of(const Problem& c) {
