@@ -258,6 +258,12 @@ SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ord
         if (last > 0) {
             const double between = (out.values[last] + out.values[last - 1]) / 2;
             const int below = count_below(A, ordering, between);
+            if (below > last && basis < 60) {  // one of a multiple value: rounding finds it among more vectors
+                SurfaceSpectrum more = lowest_eigenvalues(A, ordering, count + 20, scale);
+                more.values.conservativeResize(count);
+                more.vectors.conservativeResize(Eigen::NoChange, count);
+                return more;
+            }
             if (below != last)
                 out.doubt = fmt::format("{} eigenvalues are below {:.6g} by the inertia, {} by Lanczos' method", below,
                                         between, last);
