@@ -30,7 +30,7 @@ Sparse turned_at_nodes(const VectorField& normal, int unknowns) {
     return out;
 }
 
-// Of what the columns span, but for parts smaller than this.
+// A basis of what the columns span, but for parts smaller than `least`.
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns, double least) {
     if (columns.cols() == 0) return columns;
     const Eigenpairs gram = eigenpairs(columns.transpose() * columns, true);

@@ -76,23 +76,29 @@ class Equilibrium(ProgramTest):
             for i in (1, 2, 3):
                 self.assertAlmostEqual(abs(frame[f"PointData/mode_{i}"][()]).max(), 1)
         self.assertIn("complete", self.tubule("run", case, "--resume")[0])
-        self.stability_of_the_surface(case, result)
+        self.stability_of_the_surface(case, cell, result)
         self.begins_along_its_modes(cell, text)
         sphere = self.write("sphere.toml", text.replace('"result"\npath = "cell.hdf"', '"sphere"\nradius = 1.0') + "\nreduced_volume = 0.9\n")
         out, _ = self.tubule("equilibrium", sphere, "--set", "discretisation.elements=80", status=4)
         self.assertIn("start at an ellipsoid or a sphere with waves", out)
 
-    def stability_of_the_surface(self, case, result):
+    def stability_of_the_surface(self, case, cell, result):
         answer = json.loads(self.tubule("stability", case, "--json", "--rates", "3")[0])
         self.assertEqual((answer["shape"], answer["negative_directions"]), ("surface", 0))
         table, _ = self.tubule("stability", self.folder / "surface.hdf", "--rates", "3")
-        self.assertRegex(table, r"gradient flow(?s:.*)\n +0 directions lower the energy")
+        self.assertRegex(table, r"gradient-flow(?s:.*)\n +0 directions lower the energy")
         rows = re.findall(r"(?m)^ +\d +(\d+) +(-\S+) ", table)
         for found in [(mode["m"], mode["rate"]) for mode in answer["modes"]], rows:
             self.assertEqual([int(m) for m, _ in found], [2, 2, 1])
             for i, (_, rate) in enumerate(found):
                 self.assertAlmostEqual(float(rate) / result[f"rate_{i + 1}"][0], 1, delta=1e-3)
-        self.assertIn("signs all models share", self.tubule("stability", case, "--model", "stokes", status=2)[1])
+        model = ("--model", "overdamped", "--gamma", "2", "--json", "--rates", "3")
+        (profile,) = json.loads(self.tubule("stability", cell, *model)[0])["models"]
+        modes = json.loads(self.tubule("stability", case, *model)[0])["modes"]
+        self.assertEqual([mode["model"] for mode in modes], 3 * ["overdamped"])
+        for mode in modes:
+            exact = [one["rate"] for one in profile["slowest"] if one["m"] == mode["m"]]
+            self.assertLess(min(abs(mode["rate"] / rate - 1) for rate in exact), 1e-2)
         self.assertIn("--kT does not apply", self.tubule("stability", case, "--kT", "1", status=2)[1])
 
     def begins_along_its_modes(self, cell, text):

@@ -218,7 +218,7 @@ std::string answer_for(const StabilityOptions& options, StabilitySubject subject
     const std::vector<Problem> models = models_of(options, subject.c);
     std::optional<TubeSubject> tube;
     if (subject.frame ? subject.frame->mesh.has_value() : subject.c.unknowns == Unknowns::surface_equilibrium)
-        return surface_report(options, subject);
+        return surface_report(options, subject, models);
     // Closed forms have a pressure that does not change with the volume, and nothing that acts at places.
     const bool closed_form = !options.numerical && !subject.c.model.pressure_of_volume &&
                              subject.c.energy.potentials.empty() && !subject.c.law.beads;

@@ -61,7 +61,8 @@ std::string sphere_report(const StabilityOptions& options, const theory::Uniform
                           const std::optional<Scales>& scales, const std::vector<Problem>& models);
 std::string spectrum_report(const StabilityOptions& options, const StabilitySubject& subject,
                             const std::vector<Problem>& models);
-std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject);
+std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject,
+                           const std::vector<Problem>& models);
 std::string fit_report(const StabilityOptions& options, const StabilitySubject& subject);
 // What the picture of --plot is drawn from, as JSON.
 std::string tube_curves(const StabilityOptions& options, const TubeSubject& subject,

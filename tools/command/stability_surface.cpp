@@ -18,17 +18,25 @@ namespace tubule {
 namespace {
 
 struct SurfaceModes {
+    std::string model;
     std::map<std::string, double> values;  // of the series, at the shape
     std::vector<SlowMode> modes;           // slowest first
 };
 
-// The surface that the case looks for, or that nearest to the frame, with what the case holds.
-Problem problem_of(const StabilityOptions& options, const StabilitySubject& subject) {
+bool flows_without_inertia(const Model& model) {
+    return model_entry(model.kind).inextensible && model.kind != ModelKind::fluid;
+}
+
+// The surface that the case looks for, or that nearest to the frame, with what the case holds. A fluid, whose inertia
+// the rates would neglect, is asked for those of gradient flow: the signs are the same.
+Problem problem_of(const StabilityOptions& options, const StabilitySubject& subject, const Model& model) {
     Case c = subject.c;
+    const bool flows = flows_without_inertia(model);
+    if (flows) c.model = model;
     c.tier = Tier::surface3d;
     if (!c.equilibrium) c.equilibrium.emplace();
     EquilibriumChoices& e = *c.equilibrium;
-    e.held = subject.c.equilibrium ? subject.c.held : default_held(c.model);
+    e.held = subject.c.equilibrium ? subject.c.held : default_held(subject.c.model);
     e.family.reset(), e.modes.reset();
     e.branch = {};
     e.rates = options.rates.value_or(10);
@@ -44,7 +52,7 @@ Problem problem_of(const StabilityOptions& options, const StabilitySubject& subj
         inputs = {frame_as_input(frame, *subject.result)};
     }
     Problem out = parse_case(effective_toml(c), {}, c.path, inputs);
-    out.law.inextensible = out.law.keeps_volume = false;  // the modes are those of gradient flow
+    if (!flows) out.law.inextensible = out.law.keeps_volume = false;
     return out;
 }
 
@@ -70,7 +78,7 @@ SurfaceModes modes_of(const Problem& c) {
 std::string words_of(const SurfaceModes& found, const std::optional<Scales>& scales) {
     const auto value = [&](const char* name) { return found.values.at(name); };
     const LabUnit energy = lab_unit(scales, "energy");
-    std::string out = "gradient flow\n";
+    std::string out = found.model + "\n";
     add(out, "  stationary, with energy {:.8g} +- {:.1e}{}, tension {}, pressure {}\n", value("energy") * energy.scale,
         value("energy_error") * energy.scale, energy.after(),
         with_unit(value("tension"), lab_unit(scales, "energy/length^2"), 8),
@@ -79,11 +87,6 @@ std::string words_of(const SurfaceModes& found, const std::optional<Scales>& sca
     out += words_of_modes(found.modes, scales);
     add(out, "  {:.0f} triangles\n", value("elements"));
     return out;
-}
-
-std::string csv_of_modes(Json modes) {
-    for (std::size_t i = 0; i < modes.size(); ++i) modes[i]["model"] = "gradient-flow", modes[i]["number"] = i + 1;
-    return csv_of({"model", "number", "m", "rate", "rate_error"}, modes);
 }
 
 std::string json_text(const SurfaceModes& found, const Json& modes) {
@@ -111,22 +114,32 @@ std::string words_of_modes(const std::vector<SlowMode>& modes, const std::option
     return out;
 }
 
-std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject) {
+std::string surface_report(const StabilityOptions& options, const StabilitySubject& subject,
+                           const std::vector<Problem>& models) {
     const auto refuse = [](const char* option, const char* why) {
         throw std::invalid_argument(
             fmt::format("{} {} surfaces in three dimensions: {}", option, "does not apply to", why));
     };
-    if (!options.model.empty() && options.model != "gradient-flow")
-        refuse("--model", "their rates are those of gradient flow, whose signs all models share");
     if (options.tension) refuse("--tension", "give model.tension in the case");
     if (options.kT) refuse("--kT", "only profiles of tier axisym, tubes and spheres have mean squares");
     if (options.numerical || options.waves || !options.q.empty() || !options.plot.empty())
         refuse("--numerical, --waves, --q and --plot", "their modes are found one by one, see --rates");
-    const SurfaceModes found = modes_of(problem_of(options, subject));
-    if (!options.csv && !options.json) return words_of(found, known_scales(subject.c));
+    std::vector<SurfaceModes> found;
     Json modes = Json::array();
-    for (const auto& [rate, m, error] : found.modes) modes.push_back({{"m", m}, {"rate", rate}, {"rate_error", error}});
-    return options.csv ? csv_of_modes(modes) : json_text(found, modes);
+    for (const Problem& one : models) {
+        if (models.size() > 1 && one.model.kind == ModelKind::fluid) continue;
+        found.push_back(modes_of(problem_of(options, subject, one.model)));
+        found.back().model = flows_without_inertia(one.model) ? name(one.model) : "gradient-flow";
+        int number = 0;
+        for (const auto& [rate, m, error] : found.back().modes)
+            modes.push_back(
+                {{"model", found.back().model}, {"number", ++number}, {"m", m}, {"rate", rate}, {"rate_error", error}});
+    }
+    if (options.csv) return csv_of({"model", "number", "m", "rate", "rate_error"}, modes);
+    if (options.json) return json_text(found.front(), modes);
+    std::string out;
+    for (const SurfaceModes& one : found) out += words_of(one, known_scales(subject.c));
+    return out;
 }
 
 }  // namespace tubule
