@@ -20,6 +20,17 @@ ErrorTransport::Level::Level(const Forms& f) : forms(f), matrix(f.pattern().nonZ
     state = rate = middle = slope = residual = driven = Eigen::VectorXd::Zero(f.space().size());
 }
 
+// M (e' - e)/dt + J e' = -(mean residual of the path), with M/dt + J in `matrix`. The difference of nonlinear residuals
+// stands for J e.
+void ErrorTransport::Level::advance(double time, Eigen::VectorXd& error) {
+    lu.factor(matrix.data());
+    middle = state + error;
+    forms.residual(middle.data(), rate.data(), residual.data());
+    residual += driven / time;
+    lu.solve(residual.data());
+    error -= residual;
+}
+
 ErrorTransport::ErrorTransport(const Forms& coarse)
     : coarse_(coarse),
       fine_space_(coarse.space().cell(), halved(coarse.space().breaks()), coarse.space().degree(),
@@ -93,34 +104,15 @@ void ErrorTransport::advance() {
     f.forms.residual(f.state.data(), f.rate.data(), f.residual.data());
     f.driven -= sampled_ * f.residual;
     c.driven.noalias() = prolongation_.transpose() * f.driven;
-    advance_total();
-    advance_temporal();
-    f.driven.setZero();
-    elapsed_ = sampled_ = 0;
-    linearised_ = true;
-}
-
-// M (e' - e)/dt + J e' = -(mean residual of the path). The difference of nonlinear residuals stands for J e.
-void ErrorTransport::advance_total() {
-    Level& f = on_fine_;
     f.forms.jacobian(f.state.data(), f.rate.data(), 1 / elapsed_, f.matrix.data());
-    f.lu.factor(f.matrix.data());
-    f.middle = f.state + total;
-    f.forms.residual(f.middle.data(), f.rate.data(), f.residual.data());
-    f.residual += f.driven / elapsed_;
-    f.lu.solve(f.residual.data());
-    total -= f.residual;
-}
-
-// The same without that difference: this error is only compared.
-void ErrorTransport::advance_temporal() {
-    Level& c = on_coarse_;
+    f.advance(elapsed_, total);
     c.forms.jacobian(c.state.data(), c.rate.data(), 0, stiffness_.data());
     c.forms.mass(c.state.data(), mass_.valuePtr());
     for (std::size_t i = 0; i < stiffness_.size(); ++i) c.matrix[i] = stiffness_[i] + mass_.valuePtr()[i] / elapsed_;
-    c.lu.factor(c.matrix.data());
-    temporal = (mass_ * temporal - c.driven) / elapsed_;
-    c.lu.solve(temporal.data());
+    c.advance(elapsed_, temporal);
+    f.driven.setZero();
+    elapsed_ = sampled_ = 0;
+    linearised_ = true;
 }
 
 const double* ErrorTransport::stiffness_at(const double* x) const {

@@ -65,10 +65,9 @@ private:
         BandLu lu;
         Eigen::VectorXd state, rate, middle, slope, residual, driven;
         explicit Level(const Forms& f);
+        void advance(double time, Eigen::VectorXd& error);
     };
     Level on_fine_, on_coarse_;
-    void advance_total();
-    void advance_temporal();
     std::vector<double> stiffness_;  // on the mesh of the run, like the mass
     Eigen::SparseMatrix<double> mass_;
     bool linearised_ = false;  // since the last step
