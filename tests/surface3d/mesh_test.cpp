@@ -219,7 +219,7 @@ TEST(GradedMeshStudy, BeatsAUniformOneOfAsManyNodesOnACapsule) {
                  {0, 1.2, 1.2, 1.4, 1.4});
 }
 
-TEST(GradedMesh, BeatsAUniformOneOfAsManyNodesAtANeck) {
+TEST(GradedMeshStudy, BeatsAUniformOneOfAsManyNodesAtANeck) {
     // A neck of radius 0.2 in a tube of radius 1; the integrals from the same profile by the trapezoidal rule.
     // Measured: H 17 to 38, K 41 to 107, E20 2.9 to 32, E42 36 to 200.
     const Tube neck{.radius = 1, .length = 4, .modes = {{-0.5, 1}, {-0.3, 2}}};

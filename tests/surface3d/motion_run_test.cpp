@@ -406,7 +406,7 @@ TEST(MotionRun, GivenTrianglesDoNotBecomeFewer) {
                  std::exception);
 }
 
-TEST(MotionRun, TheCoarserRunGetsFewerTrianglesToo) {
+TEST(MotionRunStudy, TheCoarserRunGetsFewerTrianglesToo) {
     // 500 and 180 triangles, then 180 and 80.
     const std::vector<std::string> sets =
         calming({"discretisation.elements=500", "discretisation.order=2", "time.output=[0.045]"});

@@ -236,7 +236,7 @@ Eigen::Vector3d fluid_at(double end, int steps, Scheme scheme) {
     return {m.bending.energy, m.kinetic, motion.state.lambda};
 }
 
-TEST(Models, FluidsByAlphaConvergeWithSecondOrder) {
+TEST(ModelsStudy, FluidsByAlphaConvergeWithSecondOrder) {
     // Against itself on half the steps, and against backward differences, which have the same limit.
     const auto at = [](int steps, Scheme scheme) { return fluid_at(0.2, steps, scheme); };
     const Eigen::Vector3d coarse = at(6, scheme_named("alpha")), fine = at(12, scheme_named("alpha")),
