@@ -122,8 +122,8 @@ struct Pairs {
     }
 };
 
-// Of norm 1 and orthogonal to others and to each other; fewer where some depend on the others. Times `factor` they are
-// what was given, but for what the others hold.
+// Pairs of norm 1, orthogonal to the others and to each other; fewer where some depend on the others. Times `factor`
+// they are what was given, but for what the others hold.
 std::pair<Pairs, Eigen::MatrixXd> orthonormal(Pairs of, const std::vector<const Pairs*>& others) {
     const double before = of.w.cwiseProduct(of.f).colwise().sum().maxCoeff();
     for (int k = 0; k < 2; ++k)
