@@ -507,7 +507,7 @@ SurfaceSpectrum SurfaceSystem::modes(const Eigen::VectorXd& u, const MotionLaw& 
     SurfaceSpectrum still = lowest_eigenvalues(A, ordering_, count, stiffness(u));  // without what flows
     A.constraints = A.constraints.rightCols(A.constraints.cols() - motions_.cols()).eval();
     const CurvedMesh at = mesh(u);
-    const FlowForm flow = flow_form(A, space(), at, directions_.normal, law, rigid_motions(at));
+    const FlowForm flow = flow_form(A, space(), at, directions_.normal, law, rigid_motions(at), stiffness(u));
     // That of a sphere has modes of this friction, or less.
     const double drag = law.friction + 16 * pi * law.viscosity / d.values.area;
     SurfaceSpectrum out = lowest_of_flow(flow, count, still.values.cwiseAbs().maxCoeff() / drag);
