@@ -15,10 +15,11 @@ CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, con
 // The key of the formula; "energy" if there is none.
 std::string key_of_formula(const Bending& energy);
 
-// The stop of a run that comes too near to where the formula is not defined.
 // The message of a guard: `what`, for example "an element near s = 0.3 is", exceeds by the factor `times` the length
 // that resolves the shortest growing wave where kg > 0: theory.md (2.26).
 std::string unresolved_waves(const std::string& what, double times);
+
+// The stop of a run that comes too near to where the formula is not defined.
 StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
 
 // Where the pressure is a formula of the volume: the stop of a run that comes too near to where it is not defined, and

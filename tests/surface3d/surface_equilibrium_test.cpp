@@ -86,8 +86,8 @@ TEST(SurfaceSpectrum, constraintsAndLowRank) {
     EXPECT_EQ(count_below(A, nested_dissection(A.form), 10.2), (dense.array() < 10.2).count());
 }
 
-// Eigenvalues of the second variation of a sphere under a pressure: the stiffness G_l, 2 l + 1 times each. A pressure
-// of the volume with the same value acts on l = 0 alone, by -dP/dV 4 pi R^2: theory.md (3.24).
+// Eigenvalues of the second variation of a sphere under a pressure: the stiffness G_l, 2 l + 1 times each. The same
+// pressure as a formula of the volume changes l = 0 alone, by -dP/dV 4 pi R^2: theory.md (3.24).
 TEST(SurfaceSpectrum, sphere) {
     const Bending bending{.k = {0.5, 0.02, 0.06}, .H0 = -0.3};
     const theory::UniformSphere sphere{bending};
