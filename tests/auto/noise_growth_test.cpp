@@ -107,4 +107,13 @@ TEST(WaveRates, inertiaOnlySlowsWavesThatGrow) {
             }
 }
 
+// The limits of the quadratic equation: the Stokes rate where inertia is small, +- sqrt(overdamped) where it is large.
+TEST(WaveRates, haveTheSignOfWhatResistsMore) {
+    for (const double sign : {-1.0, 1.0}) {
+        EXPECT_NEAR(rate_with_inertia(sign * 5e-4, -3 * sign), sign * 5e-4, 1e-9);
+        EXPECT_NEAR(rate_with_inertia(-10, 0.01), 0.1, 1e-3);
+        EXPECT_LE(rate_with_inertia(10, -0.01), 0);
+    }
+}
+
 }  // namespace tubule::noise_growth_test

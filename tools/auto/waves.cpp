@@ -34,6 +34,8 @@ double fastest(const axisym::ModeRates& mode) {
 
 double rate_with_inertia(double stokes, double overdamped) {
     if (stokes == 0 || overdamped == 0) return 0;
+    const bool damped = std::abs(overdamped) > 4 * stokes * stokes;
+    if (stokes * overdamped < 0) (damped ? overdamped : stokes) *= -1;
     const double b = overdamped / stokes;
     const auto root = std::sqrt(std::complex<double>(b * b + 4 * overdamped));
     return (-b + root.real()) / 2;
