@@ -7,7 +7,6 @@
 
 #include "axisym/curve/coarser_curve.hpp"
 #include "axisym/curve/curve_series.hpp"
-#include "axisym/integration/ida_integrator.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/stall.hpp"
 #include "common/solve/sparse.hpp"
@@ -201,7 +200,7 @@ void CurveSimulation::make_integrator(const Eigen::VectorXd& y, const Eigen::Vec
     };
     system.n_guards = curve_guards().size();
     observed_at_ = std::numeric_limits<double>::quiet_NaN();
-    integrator_ = std::make_unique<IdaIntegrator>(std::move(system), y, rate, time, setup_.control(first_step));
+    integrator_ = make_ida(std::move(system), y, rate, time, setup_.control(first_step));
     observe(time, integrator_->x(), integrator_->v());
     keep_good();
 }
@@ -295,7 +294,7 @@ StopReport CurveSimulation::failure(const SolveError& what) {
 }
 
 void CurveSimulation::summarise() {
-    describe({.time_tolerance = setup_.settings.tolerance, .counters = counters()}, summary);
+    counters().describe(summary, setup_.settings.tolerance);
 }
 
 // Error over difference of a pair: the smaller the more steps the tolerance has limited, since steps that only grow

@@ -8,7 +8,7 @@
 #include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_guards.hpp"
 #include "axisym/curve/curve_setup.hpp"
-#include "axisym/integration/effort.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/run/energy_trace.hpp"
 #include "common/run/loop.hpp"
 #include "common/run/simulation.hpp"

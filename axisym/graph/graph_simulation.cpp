@@ -8,8 +8,6 @@
 
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_mesh.hpp"
-#include "axisym/integration/ida_integrator.hpp"
-#include "axisym/integration/rosenbrock_integrator.hpp"
 #include "common/run/energy_checks.hpp"
 
 namespace tubule::axisym {
@@ -84,10 +82,7 @@ void GraphSimulation::make_integrator(const Eigen::VectorXd& x, const Eigen::Vec
     control.max_order = case_.time.max_order;
     control.first_step = first_step;
     now_.time = std::numeric_limits<double>::quiet_NaN();
-    if (is_rosenbrock())
-        integrator_ = std::make_unique<RosenbrockIntegrator>(system(), x, v, t, control);
-    else
-        integrator_ = std::make_unique<IdaIntegrator>(system(), x, v, t, control);
+    integrator_ = (is_rosenbrock() ? make_rosenbrock : make_ida)(system(), x, v, t, control);
     mesh_->transport.begin(integrator_->x(), integrator_->v());
     error_.begin(observe(t, integrator_->x(), integrator_->v()));
     dissipated_.begin(t, now_.o.dissipation);
@@ -313,9 +308,9 @@ double GraphSimulation::least_error() const {
 
 void GraphSimulation::summarise() {
     summary.estimated_error = std::max(stated_over_computed * error_.largest, least_error()) / summary.reference_energy;
-    Effort effort{is_rosenbrock() ? "rosenbrock" : "ida", meshes_, settings_.time_tolerance, past_.counters};
-    effort.counters += integrator_->counters();
-    describe(effort, summary);
+    IntegratorCounters counters = past_.counters;
+    counters += integrator_->counters();
+    counters.describe(summary, settings_.time_tolerance, is_rosenbrock() ? "rosenbrock" : "ida", meshes_);
 }
 
 // A state at the end of the last step or within it.

@@ -10,7 +10,6 @@
 #include "axisym/graph/graph_guards.hpp"
 #include "axisym/graph/graph_mesh.hpp"
 #include "axisym/graph/graph_output.hpp"
-#include "axisym/integration/effort.hpp"
 #include "axisym/integration/step_integral.hpp"
 #include "axisym/integration/time_integrator.hpp"
 #include "common/run/simulation.hpp"

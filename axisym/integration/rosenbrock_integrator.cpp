@@ -1,4 +1,5 @@
-#include "axisym/integration/rosenbrock_integrator.hpp"
+// Rosenbrock's linearly implicit method of order 5 with eight stages: Rodas5P of Steinebach (BIT 63:27, 2023), stiffly
+// accurate and L-stable, of full order for parabolic equations too.
 
 #include <fmt/format.h>
 
@@ -6,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "axisym/integration/time_integrator.hpp"
 #include "axisym/splines/band_lu.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
@@ -66,124 +68,152 @@ double lagrange(std::size_t j, double a) {
     return value;
 }
 
-}  // namespace
-
 // Many fields: the vectors of a step, and what it is to keep.
-struct RosenbrockIntegrator::Impl {
-    ImplicitSystem system;
-    TimeControl control;
-    int n;
-    double time, next = 0;  // next: length of the step
-    Eigen::VectorXd x, v;
-    Eigen::VectorXd x_after, state, rate, side, residual;
-    Eigen::Matrix<double, Eigen::Dynamic, stages> of_x, of_v;  // increments of the stages
-    Eigen::SparseMatrix<double> mass, mass_after;              // at x, x_after
-    std::vector<double> stiffness, matrix;
-    BandLu lu, mass_lu;
-    bool linearised = false;  // stiffness is that at x, v
-
-    // The last step: its path is a polynomial in (t - begin)/length.
-    double begin, length = 0;
-    Eigen::VectorXd x_begin, v_begin, x_end;
-    Eigen::Matrix<double, Eigen::Dynamic, 3> bend;
-
-    using Powers = std::array<double, 2>;  // dissipation and work
-    Powers done{}, done_now{};             // INT of them until the begin and the end of the last step
-    std::array<Powers, 5> power{};         // at the begin of the last step, its path's points, its end
-    bool cut = false;                      // the last step ended at a guard
-    int guard = -1;
-    std::string message;
-    IntegratorCounters counters;
-
-    Impl(ImplicitSystem s, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0, const TimeControl& c)
-        : system(std::move(s)),
-          control(c),
-          n(static_cast<int>(x0.size())),
-          time(t0),
-          x(x0),
-          v(v0),
-          mass(*system.pattern),
-          mass_after(mass),
-          stiffness(mass.nonZeros()),
-          matrix(mass.nonZeros()),
-          lu(*system.pattern),
-          mass_lu(*system.pattern),
-          begin(t0),
-          x_begin(x0),
-          x_end(x0) {
-        of_x.setZero(n, stages), of_v.setZero(n, stages), bend.setZero(n, 3);
-        x_after = state = rate = side = residual = Eigen::VectorXd::Zero(n);
+class RosenbrockIntegrator final : public TimeIntegrator {
+public:
+    RosenbrockIntegrator(ImplicitSystem s, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0, double t0,
+                         const TimeControl& c)
+        : system_(std::move(s)),
+          control_(c),
+          n_(static_cast<int>(x0.size())),
+          time_(t0),
+          x_(x0),
+          v_(v0),
+          mass_(*system_.pattern),
+          mass_after_(mass_),
+          stiffness_(mass_.nonZeros()),
+          matrix_(mass_.nonZeros()),
+          lu_(*system_.pattern),
+          mass_lu_(*system_.pattern),
+          begin_(t0),
+          x_begin_(x0),
+          x_end_(x0) {
+        of_x_.setZero(n_, stages), of_v_.setZero(n_, stages), bend_.setZero(n_, 3);
+        x_after_ = state_ = rate_ = side_ = residual_ = Eigen::VectorXd::Zero(n_);
         double speed = 0;
-        for (int i = 0; i < n; ++i) speed = std::max(speed, control.relative * std::abs(v[i]) / weight(x[i]));
-        next = c.first_step > 0 ? c.first_step : speed > 0 ? first_change / speed : 1;
-        system.mass(x.data(), mass.valuePtr());
-        power.back() = powers(t0, x.data(), v.data());
+        for (int i = 0; i < n_; ++i) speed = std::max(speed, control_.relative * std::abs(v_[i]) / weight(x_[i]));
+        next_ = c.first_step > 0 ? c.first_step : speed > 0 ? first_change / speed : 1;
+        system_.mass(x_.data(), mass_.valuePtr());
+        power_.back() = powers(t0, x_.data(), v_.data());
     }
+
+    Outcome advance(double t_end) override {
+        check_pause();
+        if (control_.relative < std::numeric_limits<double>::epsilon()) {
+            message_ = fmt::format("errors of {:.3g} a step are too much accuracy for this machine", control_.relative);
+            return Outcome::failed;
+        }
+        done_ = done_now_, cut_ = false;
+        const double left = t_end - time_;
+        for (;;) {
+            // Two steps share what is left: none is as short as nothing.
+            const bool last = next_ >= left;
+            const double h = last ? left : std::min(next_, std::max(left / 2, 0.1 * next_));
+            if (!(time_ + h > time_)) {
+                message_ = fmt::format("the step became as short as {:.3g} at t = {:.6g}", h, time_);
+                return Outcome::failed;
+            }
+            if (take(h)) {
+                accept(h, last ? t_end : time_ + h);
+                return ends_at_guard() ? Outcome::guard : last ? Outcome::end : Outcome::step;
+            }
+        }
+    }
+
+    void interpolate(double t, double* at, double* slope) const override {
+        const double a = length_ > 0 ? (t - begin_) / length_ : 1, b = 1 - a;
+        Eigen::Map<Eigen::VectorXd>(at, n_) = b * x_begin_ + a * x_end_ + (a * b) * bend_.col(0) +
+                                              (a * a * b) * bend_.col(1) + (a * a * a * b) * bend_.col(2);
+        Eigen::Map<Eigen::VectorXd>(slope, n_) =
+            (x_end_ - x_begin_ + (1 - 2 * a) * bend_.col(0) + (a * (2 - 3 * a)) * bend_.col(1) +
+             (a * a * (3 - 4 * a)) * bend_.col(2)) /
+            (length_ > 0 ? length_ : 1);
+    }
+
+    void state_within_step(double t, double* at, double* slope) override {
+        if (!(t > begin_) || !step_again(t)) return interpolate(t, at, slope);
+        Eigen::Map<Eigen::VectorXd>(at, n_) = x_after_;
+        Eigen::Map<Eigen::VectorXd>(slope, n_) = rate_;
+    }
+
+    double time() const override { return time_; }
+    const double* x() const override { return x_.data(); }
+    const double* v() const override { return v_.data(); }
+    double dissipated(double t) const override { return done_until(t)[0]; }
+    double work(double t) const override { return done_until(t)[1]; }
+    double step_size() const override { return time_ - begin_; }
+    int order() const override { return 5; }
+    int tripped() const override { return guard_; }
+    std::string failure() const override { return message_; }
+    IntegratorCounters counters() const override { return counters_; }
+
+private:
+    using Powers = std::array<double, 2>;  // dissipation and work
 
     Powers powers(double t, const double* at, const double* slope) const {
-        return {system.dissipation(t, at, slope), system.work ? system.work(t, at, slope) : 0};
+        return {system_.dissipation(t, at, slope), system_.work ? system_.work(t, at, slope) : 0};
     }
 
-    double weight(double value) const { return control.relative * std::abs(value) + control.absolute; }
+    double weight(double value) const { return control_.relative * std::abs(value) + control_.absolute; }
 
     bool evaluate(const Eigen::VectorXd& at, const Eigen::VectorXd& slope) {
-        ++counters.residuals;
-        return system.residual(time, at.data(), slope.data(), residual.data());
+        ++counters_.residuals;
+        return system_.residual(time_, at.data(), slope.data(), residual_.data());
     }
 
     // The increments of a step of length h, and the state after it with the rates of the method. False where a stage is
     // inadmissible. Throws SolveError.
     bool find_increments(double h) {
         const double cj = 1 / (h * diagonal);
-        for (std::size_t i = 0; i < matrix.size(); ++i) matrix[i] = stiffness[i] + cj * mass.valuePtr()[i];
-        lu.factor(matrix.data());
+        for (std::size_t i = 0; i < matrix_.size(); ++i) matrix_[i] = stiffness_[i] + cj * mass_.valuePtr()[i];
+        lu_.factor(matrix_.data());
         for (int i = 0; i < stages; ++i) {
             if (i < 6) {
-                state = x, rate = v;
+                state_ = x_, rate_ = v_;
                 for (int j = 0; j < i; ++j) {
-                    state += into_state[i][j] * of_x.col(j);
-                    rate += into_state[i][j] * of_v.col(j);
+                    state_ += into_state[i][j] * of_x_.col(j);
+                    rate_ += into_state[i][j] * of_v_.col(j);
                 }
             } else {
-                state += of_x.col(i - 1), rate += of_v.col(i - 1);
+                state_ += of_x_.col(i - 1), rate_ += of_v_.col(i - 1);
             }
-            if (!evaluate(state, rate)) return false;
-            side = rate;
-            for (int j = 0; j < i; ++j) side += (into_side[i][j] / h) * of_x.col(j);
-            of_x.col(i) = mass * side - residual;
-            lu.solve(of_x.col(i).data());
-            of_v.col(i) = cj * of_x.col(i) - side;
+            if (!evaluate(state_, rate_)) return false;
+            side_ = rate_;
+            for (int j = 0; j < i; ++j) side_ += (into_side[i][j] / h) * of_x_.col(j);
+            of_x_.col(i) = mass_ * side_ - residual_;
+            lu_.solve(of_x_.col(i).data());
+            of_v_.col(i) = cj * of_x_.col(i) - side_;
         }
-        x_after = state + of_x.col(stages - 1);
-        rate += of_v.col(stages - 1);
-        return x_after.allFinite();
+        x_after_ = state_ + of_x_.col(stages - 1);
+        rate_ += of_v_.col(stages - 1);
+        return x_after_.allFinite();
     }
 
     // Local error of the method of order 4 beside it, relative to what is allowed.
     double error() const {
         double sum = 0;
-        for (int i = 0; i < n; ++i)
-            sum += std::pow(of_x(i, stages - 1) / weight(std::max(std::abs(x[i]), std::abs(x_after[i]))), 2);
-        return std::sqrt(sum / n);
+        for (int i = 0; i < n_; ++i)
+            sum += std::pow(of_x_(i, stages - 1) / weight(std::max(std::abs(x_[i]), std::abs(x_after_[i]))), 2);
+        return std::sqrt(sum / n_);
     }
 
     // The rates that solve the system at x_after, and the mass there. Those of the method do so only to the error of
     // the step. False where x_after is inadmissible. Throws SolveError.
     bool find_rates() {
-        if (!evaluate(x_after, rate)) return false;
-        system.mass(x_after.data(), mass_after.valuePtr());
-        mass_lu.factor(mass_after.valuePtr());
-        mass_lu.solve(residual.data());
-        rate -= residual;
+        if (!evaluate(x_after_, rate_)) return false;
+        system_.mass(x_after_.data(), mass_after_.valuePtr());
+        mass_lu_.factor(mass_after_.valuePtr());
+        mass_lu_.solve(residual_.data());
+        rate_ -= residual_;
         return true;
     }
 
     // Whether a step of length h was taken; sets the length that is good next.
     bool take(double h) {
-        if (!linearised) {
-            system.jacobian(time, x.data(), v.data(), 0, stiffness.data());
-            ++counters.jacobians;
-            linearised = true;
+        if (!linearised_) {
+            system_.jacobian(time_, x_.data(), v_.data(), 0, stiffness_.data());
+            ++counters_.jacobians;
+            linearised_ = true;
         }
         bool admissible = false;
         try {
@@ -191,59 +221,49 @@ struct RosenbrockIntegrator::Impl {
         } catch (const SolveError&) {  // shorter steps have better matrices
         }
         const double e = admissible ? error() : std::numeric_limits<double>::infinity();
-        next = h * std::clamp(safety * std::pow(e, -0.2), least_growth, most_growth);
+        next_ = h * std::clamp(safety * std::pow(e, -0.2), least_growth, most_growth);
         if (e <= 1 && find_rates()) return true;
-        ++(admissible ? counters.error_failures : counters.newton_failures);
-        if (e <= 1) next = h * least_growth;
+        ++(admissible ? counters_.error_failures : counters_.newton_failures);
+        if (e <= 1) next_ = h * least_growth;
         return false;
     }
 
     void accept(double h, double t_after) {
-        begin = time, length = h;
-        x_begin = x, v_begin = v, x_end = x_after;
+        begin_ = time_, length_ = h;
+        x_begin_ = x_, v_begin_ = v_, x_end_ = x_after_;
         for (int k = 0; k < 3; ++k) {
-            bend.col(k).setZero();
-            for (int i = 0; i < stages; ++i) bend.col(k) += into_bend[k][i] * of_x.col(i);
+            bend_.col(k).setZero();
+            for (int i = 0; i < stages; ++i) bend_.col(k) += into_bend[k][i] * of_x_.col(i);
         }
-        x = x_after, v = rate;
-        mass.swap(mass_after);
-        time = t_after;
-        linearised = false;
-        ++counters.steps;
-    }
-
-    void interpolate(double t, double* at, double* slope) const {
-        const double a = length > 0 ? (t - begin) / length : 1, b = 1 - a;
-        Eigen::Map<Eigen::VectorXd>(at, n) =
-            b * x_begin + a * x_end + (a * b) * bend.col(0) + (a * a * b) * bend.col(1) + (a * a * a * b) * bend.col(2);
-        Eigen::Map<Eigen::VectorXd>(slope, n) =
-            (x_end - x_begin + (1 - 2 * a) * bend.col(0) + (a * (2 - 3 * a)) * bend.col(1) +
-             (a * a * (3 - 4 * a)) * bend.col(2)) /
-            (length > 0 ? length : 1);
+        x_ = x_after_, v_ = rate_;
+        mass_.swap(mass_after_);
+        time_ = t_after;
+        linearised_ = false;
+        ++counters_.steps;
     }
 
     // A step from the begin of the last one, whose stiffness is still there, to a time within it.
     bool step_again(double t) {
-        x.swap(x_begin), v.swap(v_begin), mass.swap(mass_after);
+        x_.swap(x_begin_), v_.swap(v_begin_), mass_.swap(mass_after_);
         bool good = false;
         try {
-            good = find_increments(t - begin);
+            good = find_increments(t - begin_);
         } catch (const SolveError&) {  // the path is there, too
         }
-        x.swap(x_begin), v.swap(v_begin), mass.swap(mass_after);
+        x_.swap(x_begin_), v_.swap(v_begin_), mass_.swap(mass_after_);
         if (!good) return false;
-        const Eigen::SparseMatrix<double> before = mass_after;
+        const Eigen::SparseMatrix<double> before = mass_after_;
         good = find_rates();
-        mass_after = before;
+        mass_after_ = before;
         return good;
     }
 
     // INT of dissipation and work from the begin of the last step until t, along its path.
     Powers integrals(double t) const {
         Powers sums{};
-        Eigen::VectorXd at(n), slope(n);
+        Eigen::VectorXd at(n_), slope(n_);
         for (std::size_t q = 0; q < path_points.size(); ++q) {
-            const double when = begin + path_points[q] * (t - begin), weight = path_weights[q] * (t - begin);
+            const double when = begin_ + path_points[q] * (t - begin_), weight = path_weights[q] * (t - begin_);
             interpolate(when, at.data(), slope.data());
             const Powers here = powers(when, at.data(), slope.data());
             for (int k = 0; k < 2; ++k) sums[k] += weight * here[k];
@@ -253,19 +273,19 @@ struct RosenbrockIntegrator::Impl {
 
     // Dissipated and worked until t. Within a whole step the polynomial through the known powers costs nothing.
     Powers done_until(double t) const {
-        if (t == time) return done_now;
-        Powers out = done;
-        if (cut) {
+        if (t == time_) return done_now_;
+        Powers out = done_;
+        if (cut_) {
             const Powers more = integrals(t);
             for (int k = 0; k < 2; ++k) out[k] += more[k];
             return out;
         }
-        const double a = (t - begin) / length;
+        const double a = (t - begin_) / length_;
         for (std::size_t j = 0; j < nodes.size(); ++j) {
             double weight = 0;
             for (std::size_t q = 0; q < path_points.size(); ++q)
                 weight += path_weights[q] * lagrange(j, a * path_points[q]);
-            for (int k = 0; k < 2; ++k) out[k] += a * length * weight * power[j][k];
+            for (int k = 0; k < 2; ++k) out[k] += a * length_ * weight * power_[j][k];
         }
         return out;
     }
@@ -273,14 +293,14 @@ struct RosenbrockIntegrator::Impl {
     // Whether a guard trips within the last step, which then ends there. Guards and dissipation look at the same
     // states.
     bool ends_at_guard() {
-        Eigen::VectorXd at(n), slope(n);
-        double low = begin, high = time;
-        guard = -1;
-        const auto trips = [&](double t, const double* x, const double* v) {
-            const Guards guards = system.guards(t, x, v);
+        Eigen::VectorXd at(n_), slope(n_);
+        double low = begin_, high = time_;
+        guard_ = -1;
+        const auto trips = [&](double t, const double* state_at, const double* slope_at) {
+            const Guards guards = system_.guards(t, state_at, slope_at);
             const auto found = std::find_if(guards.begin(), guards.end(), [](double g) { return !(g > 0); });
             if (found == guards.end()) return false;
-            guard = static_cast<int>(found - guards.begin()), high = t;
+            guard_ = static_cast<int>(found - guards.begin()), high = t;
             return true;
         };
         const auto trips_at = [&](double t) {
@@ -288,106 +308,62 @@ struct RosenbrockIntegrator::Impl {
             return trips(t, at.data(), slope.data());
         };
         bool found = false;
-        power.front() = power.back();
+        power_.front() = power_.back();
         for (std::size_t q = 0; q < path_points.size() && !found; ++q) {
-            const double t = begin + path_points[q] * length;
+            const double t = begin_ + path_points[q] * length_;
             found = trips_at(t);
-            power[1 + q] = powers(t, at.data(), slope.data());
+            power_[1 + q] = powers(t, at.data(), slope.data());
         }
-        if (!found && !trips(time, x.data(), v.data())) {
-            power.back() = powers(time, x.data(), v.data());
-            done_now = done;
+        if (!found && !trips(time_, x_.data(), v_.data())) {
+            power_.back() = powers(time_, x_.data(), v_.data());
+            done_now_ = done_;
             for (std::size_t q = 0; q < path_points.size(); ++q)
-                for (int k = 0; k < 2; ++k) done_now[k] += path_weights[q] * length * power[1 + q][k];
+                for (int k = 0; k < 2; ++k) done_now_[k] += path_weights[q] * length_ * power_[1 + q][k];
             return false;
         }
-        cut = true;
+        cut_ = true;
         for (int k = 0; k < bisections; ++k)
             if (const double middle = (low + high) / 2; !trips_at(middle)) low = middle;
-        if (high < time) {
-            time = high;
-            interpolate(time, x.data(), v.data());
+        if (high < time_) {
+            time_ = high;
+            interpolate(time_, x_.data(), v_.data());
         }
-        const Powers more = integrals(time);
-        done_now = {done[0] + more[0], done[1] + more[1]};
-        power.back() = powers(time, x.data(), v.data());
+        const Powers more = integrals(time_);
+        done_now_ = {done_[0] + more[0], done_[1] + more[1]};
+        power_.back() = powers(time_, x_.data(), v_.data());
         return true;
     }
+
+    ImplicitSystem system_;
+    TimeControl control_;
+    int n_;
+    double time_, next_ = 0;  // next: length of the step
+    Eigen::VectorXd x_, v_;
+    Eigen::VectorXd x_after_, state_, rate_, side_, residual_;
+    Eigen::Matrix<double, Eigen::Dynamic, stages> of_x_, of_v_;  // increments of the stages
+    Eigen::SparseMatrix<double> mass_, mass_after_;              // at x, x_after
+    std::vector<double> stiffness_, matrix_;
+    BandLu lu_, mass_lu_;
+    bool linearised_ = false;  // stiffness is that at x, v
+
+    // The last step: its path is a polynomial in (t - begin)/length.
+    double begin_, length_ = 0;
+    Eigen::VectorXd x_begin_, v_begin_, x_end_;
+    Eigen::Matrix<double, Eigen::Dynamic, 3> bend_;
+
+    Powers done_{}, done_now_{};     // INT of them until the begin and the end of the last step
+    std::array<Powers, 5> power_{};  // at the begin of the last step, its path's points, its end
+    bool cut_ = false;               // the last step ended at a guard
+    int guard_ = -1;
+    std::string message_;
+    IntegratorCounters counters_;
 };
 
-RosenbrockIntegrator::RosenbrockIntegrator(ImplicitSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0,
-                                           double t0, const TimeControl& control)
-    : impl_(std::make_unique<Impl>(std::move(system), x0, v0, t0, control)) {}
+}  // namespace
 
-RosenbrockIntegrator::~RosenbrockIntegrator() = default;
-
-TimeIntegrator::Outcome RosenbrockIntegrator::advance(double t_end) {
-    Impl& s = *impl_;
-    check_pause();
-    if (s.control.relative < std::numeric_limits<double>::epsilon()) {
-        s.message = fmt::format("errors of {:.3g} a step are too much accuracy for this machine", s.control.relative);
-        return Outcome::failed;
-    }
-    s.done = s.done_now, s.cut = false;
-    const double left = t_end - s.time;
-    for (;;) {
-        // Two steps share what is left: none is as short as nothing.
-        const bool last = s.next >= left;
-        const double h = last ? left : std::min(s.next, std::max(left / 2, 0.1 * s.next));
-        if (!(s.time + h > s.time)) {
-            s.message = fmt::format("the step became as short as {:.3g} at t = {:.6g}", h, s.time);
-            return Outcome::failed;
-        }
-        if (s.take(h)) {
-            s.accept(h, last ? t_end : s.time + h);
-            return s.ends_at_guard() ? Outcome::guard : last ? Outcome::end : Outcome::step;
-        }
-    }
-}
-
-double RosenbrockIntegrator::time() const {
-    return impl_->time;
-}
-const double* RosenbrockIntegrator::x() const {
-    return impl_->x.data();
-}
-const double* RosenbrockIntegrator::v() const {
-    return impl_->v.data();
-}
-
-void RosenbrockIntegrator::interpolate(double t, double* x, double* v) const {
-    impl_->interpolate(t, x, v);
-}
-
-void RosenbrockIntegrator::state_within_step(double t, double* x, double* v) {
-    Impl& s = *impl_;
-    if (!(t > s.begin) || !s.step_again(t)) return s.interpolate(t, x, v);
-    Eigen::Map<Eigen::VectorXd>(x, s.n) = s.x_after;
-    Eigen::Map<Eigen::VectorXd>(v, s.n) = s.rate;
-}
-
-double RosenbrockIntegrator::dissipated(double t) const {
-    return impl_->done_until(t)[0];
-}
-
-double RosenbrockIntegrator::work(double t) const {
-    return impl_->done_until(t)[1];
-}
-
-double RosenbrockIntegrator::step_size() const {
-    return impl_->time - impl_->begin;
-}
-int RosenbrockIntegrator::order() const {
-    return 5;
-}
-int RosenbrockIntegrator::tripped() const {
-    return impl_->guard;
-}
-std::string RosenbrockIntegrator::failure() const {
-    return impl_->message;
-}
-IntegratorCounters RosenbrockIntegrator::counters() const {
-    return impl_->counters;
+std::unique_ptr<TimeIntegrator> make_rosenbrock(ImplicitSystem system, const Eigen::VectorXd& x0,
+                                                const Eigen::VectorXd& v0, double t0, const TimeControl& control) {
+    return std::make_unique<RosenbrockIntegrator>(std::move(system), x0, v0, t0, control);
 }
 
 }  // namespace tubule::axisym

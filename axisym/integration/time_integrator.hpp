@@ -9,6 +9,10 @@
 #include <string>
 #include <vector>
 
+namespace tubule {
+struct RunSummary;
+}
+
 namespace tubule::axisym {
 
 struct TimeControl {
@@ -21,19 +25,16 @@ struct TimeControl {
     // At least two iterations. IDA accepts one where earlier ones converged quickly; then constraints hold only to
     // the error of the step, because they are nonlinear.
     bool two_iterations = false;
-    // The second correction may be larger than the first: that of unknowns whose errors do not count acts on the
-    // others.
+    // Convergence is judged from the second correction where it is the larger: unknowns outside the error norm may
+    // push the others only then.
     bool second_may_grow = false;
 };
 
 struct IntegratorCounters {
     long steps = 0, residuals = 0, jacobians = 0, newton_iterations = 0, error_failures = 0, newton_failures = 0;
-    IntegratorCounters& operator+=(const IntegratorCounters& o) {
-        steps += o.steps, residuals += o.residuals, jacobians += o.jacobians;
-        newton_iterations += o.newton_iterations, error_failures += o.error_failures;
-        newton_failures += o.newton_failures;
-        return *this;
-    }
+    IntegratorCounters& operator+=(const IntegratorCounters& o);
+    // Sets `effort` and `details` of a run, or of its last attempt.
+    void describe(RunSummary& summary, double time_tolerance, const char* integrator = "ida", int meshes = 1) const;
 };
 
 // Guards are functions of the state, positive while all is well; a step that takes one of them through zero ends there.
@@ -43,10 +44,10 @@ using Guards = std::vector<double>;
 struct ImplicitSystem {
     // F(t, x, v); false where x is inadmissible: try a smaller step.
     std::function<bool(double t, const double* x, const double* v, double* F)> residual;
-    // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the flow.
+    // dF/dx + cj dF/dv, into the values of a matrix with `pattern`, which must outlive the integrator.
     std::function<void(double t, const double* x, const double* v, double cj, double* values)> jacobian;
     const Eigen::SparseMatrix<double>* pattern = nullptr;
-    // dF/dv at x, likewise, of a system that is linear in v and does not depend on the time; RosenbrockIntegrator needs
+    // dF/dv at x, likewise, of a system that is linear in v and does not depend on the time; make_rosenbrock() needs
     // it.
     std::function<void(const double* x, double* values)> mass;
     bool banded = false;           // the unknowns stand in an order that is good for elimination
@@ -88,5 +89,14 @@ public:
     virtual std::string failure() const = 0;  // why the last step failed
     virtual IntegratorCounters counters() const = 0;
 };
+
+// From x0 with rates v0, which solve the system. By backward differences of variable order, of IDA:
+std::unique_ptr<TimeIntegrator> make_ida(ImplicitSystem system, const Eigen::VectorXd& x0, const Eigen::VectorXd& v0,
+                                         double t0, const TimeControl& control);
+// By Rodas5P, for systems M(x) v + G(x) = 0 that do not depend on the time. One Jacobian and one factorisation a step,
+// no history: on a new mesh a flow continues with steps as long as before. Of the control, max_order and what concerns
+// Newton's method mean nothing.
+std::unique_ptr<TimeIntegrator> make_rosenbrock(ImplicitSystem system, const Eigen::VectorXd& x0,
+                                                const Eigen::VectorXd& v0, double t0, const TimeControl& control);
 
 }  // namespace tubule::axisym
