@@ -7,6 +7,7 @@
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/curve/varying_H0.hpp"
 #include "axisym/splines/added_terms.hpp"
+#include "axisym/splines/element_pattern.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -82,36 +83,16 @@ auto by_energy(const Bending& bending, const Kernel& kernel) {
 
 CurveForms::CurveForms(const CurveSpace& space, const Bending& bending) : space_(space), images_(space.images()) {
     set_bending(bending);
-    const int w = space.splines().width(), n = space.splines().elements();
-    const auto dof = [&](int e, int a) {  // -1: absent
-        const SplineSpace& field = a < w ? space.r() : space.z();
-        return field.signs(e)[a % w] == 0 ? -1 : field.dofs(e)[a % w] + (a < w ? 0 : space.r().size());
+    const auto dofs = [&](int e) {
+        std::vector<int> out;
+        for (int field = 0; field < 2; ++field)
+            for (int a = 0; a < space.splines().width(); ++a)
+                out.push_back(space.field(field).signs(e)[a] == 0 ? -1 : space.dof(e, field, a));
+        return out;
     };
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int e = 0; e < n; ++e)
-        for (int b = 0; b < 2 * w; ++b)
-            for (int a = 0; a < 2 * w; ++a)
-                if (dof(e, a) >= 0 && dof(e, b) >= 0) entries.emplace_back(dof(e, a), dof(e, b), 0.0);
-    if (space.free_period()) {
-        const int rise = space.shape_size();
-        for (int i = 0; i <= rise; ++i) {
-            entries.emplace_back(i, rise, 0.0);
-            entries.emplace_back(rise, i, 0.0);
-        }
-    }
-    pattern_.resize(space.size(), space.size());
-    pattern_.setFromTriplets(entries.begin(), entries.end());
-    for (int e = 0; e < n; ++e)
-        for (int b = 0; b < 2 * w; ++b)
-            for (int a = 0; a < 2 * w; ++a) {
-                int slot = 0;  // receives zeros for what is absent
-                if (dof(e, a) >= 0 && dof(e, b) >= 0) {
-                    const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[dof(e, b)];
-                    const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[dof(e, b) + 1];
-                    slot = static_cast<int>(std::lower_bound(begin, end, dof(e, a)) - pattern_.innerIndexPtr());
-                }
-                slots_.push_back(slot);
-            }
+    const std::vector<int> full = space.free_period() ? std::vector{space.shape_size()} : std::vector<int>{};
+    auto [pattern, slots] = element_pattern(space.size(), space.splines().elements(), dofs, full);
+    pattern_ = std::move(pattern), slots_ = std::move(slots);
 }
 
 void CurveForms::set_bending(const Bending& bending) {
@@ -146,12 +127,10 @@ template <int P>
                         }
             }
             for (int field = 0; field < 2; ++field) {
-                const SplineSpace& f = field == 0 ? space_.r() : space_.z();
-                double* to = field == 0 ? out : out + space_.r().size();
                 alignas(32) double local[wide];
                 store(sums[field][0], local);
                 store(sums[field][1], local + lanes);
-                for (int a = 0; a <= P; ++a) to[f.dofs(e)[a]] += f.signs(e)[a] * local[a];
+                space_.add(e, field, local, out);
             }
         }
         if (space_.free_period()) out[space_.shape_size()] += stdx::reduce(rise);
@@ -202,8 +181,8 @@ template <int P>
                     alignas(32) double column[wide];
                     store(local[b / w][of][b % w][0], column);
                     store(local[b / w][of][b % w][1], column + lanes);
-                    const double sign = (b < w ? space_.r() : space_.z()).signs(e)[b % w];
-                    const double* signs = (of == 0 ? space_.r() : space_.z()).signs(e);
+                    const double sign = space_.field(b / w).signs(e)[b % w];
+                    const double* signs = space_.field(of).signs(e);
                     for (int a = 0; a < w; ++a) values[slot[b * 2 * w + of * w + a]] += sign * signs[a] * column[a];
                 }
         }
@@ -266,40 +245,30 @@ void CurveForms::add_hessian(const Weights& weights, const double* x, double* va
 // The second derivatives with one in the rise, by the number of the other coefficient.
 template <class Add>
 void CurveForms::add_rise_hessian(const Weights& weights, const double* x, const Add& add) const {
-    const SplineSpace& splines = space_.splines();
     if (const double kg = weights.energy * bending_.kg; kg != 0) gradients_->each_by_rise(kg, x, add);
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const PointH0 H0(fixed_H0(), e * splines.groups() + g, bending_.H0);
-            const auto density = functional_density<2>(bending_, H0, weights, Local(space_, e, g, x));
-            const Pack weight = images_ * load(basis.weight);
-            const int z1 = first_variable[1];
-            add(space_.shape_size(), stdx::reduce(weight * density.dd[packed<5>(z1, z1)]));
-            for (int field = 0; field < 2; ++field) {
-                const SplineSpace& f = field == 0 ? space_.r() : space_.z();
-                for (int d = first_derivative[field]; d < 3; ++d) {
-                    const Pack c =
-                        weight * density.dd[packed<5>(z1, first_variable[field] + d - first_derivative[field])];
-                    for (int a = 0; a < splines.width(); ++a)
-                        add(f.dofs(e)[a] + (field == 0 ? 0 : space_.r().size()),
-                            f.signs(e)[a] * stdx::reduce(c * load(basis.by_point[d][a])));
-                }
+    each_group(space_, x, [&](int e, int i, const auto& basis, const Local& at) {
+        const PointH0 H0(fixed_H0(), i, bending_.H0);
+        const auto density = functional_density<2>(bending_, H0, weights, at);
+        const Pack weight = images_ * load(basis.weight);
+        const int z1 = first_variable[1];
+        add(space_.shape_size(), stdx::reduce(weight * density.dd[packed<5>(z1, z1)]));
+        for (int field = 0; field < 2; ++field)
+            for (int d = first_derivative[field]; d < 3; ++d) {
+                const Pack c = weight * density.dd[packed<5>(z1, first_variable[field] + d - first_derivative[field])];
+                for (int a = 0; a < space_.splines().width(); ++a)
+                    add(space_.dof(e, field, a),
+                        space_.field(field).signs(e)[a] * stdx::reduce(c * load(basis.by_point[d][a])));
             }
-        }
+    });
 }
 
 double CurveForms::stretch_slope(const Weights& weights, const Eigen::VectorXd& x) const {
-    const SplineSpace& splines = space_.splines();
     Pack sum{0.0};
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const Local at(space_, e, g, x.data());
-            const PointH0 H0(fixed_H0(), e * splines.groups() + g, bending_.H0);
-            const auto density = functional_density<1>(bending_, H0, weights, at);
-            sum += load(splines.basis(e, g).weight) *
-                   (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
-        }
+    each_group(space_, x.data(), [&](int, int i, const auto& basis, const Local& at) {
+        const PointH0 H0(fixed_H0(), i, bending_.H0);
+        const auto density = functional_density<1>(bending_, H0, weights, at);
+        sum += load(basis.weight) * (density.d[first_variable[1]] * at.z1 + density.d[first_variable[1] + 1] * at.z2);
+    });
     const double kg = weights.energy * bending_.kg;
     const double of_places = W_ && weights.energy != 0 ? potential_stretch(space_, *W_, x.data()) : 0;
     return images_ * stdx::reduce(sum) + weights.energy * of_places +
@@ -325,46 +294,37 @@ std::array<Jet<Pack, 5, Order>, 2> sliding_rows(const Bending& bending, const Va
 }  // namespace
 
 void CurveForms::add_sliding(const double* x, double* out) const {
-    const SplineSpace& splines = space_.splines();
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const Pack weight = images_ * load(basis.weight);
-            const auto rows = sliding_rows<1>(bending_, fixed_H0(), e * splines.groups() + g, Local(space_, e, g, x));
-            for (int field = 0; field < 2; ++field) {
-                const SplineSpace& f = field == 0 ? space_.r() : space_.z();
-                double* to = field == 0 ? out : out + space_.r().size();
-                for (int a = 0; a < splines.width(); ++a)
-                    to[f.dofs(e)[a]] +=
-                        f.signs(e)[a] * stdx::reduce(weight * rows[field].v * load(basis.by_point[0][a]));
-            }
+    each_group(space_, x, [&](int e, int i, const auto& basis, const Local& at) {
+        const Pack weight = images_ * load(basis.weight);
+        const auto rows = sliding_rows<1>(bending_, fixed_H0(), i, at);
+        for (int field = 0; field < 2; ++field) {
+            double local[wide];
+            for (int a = 0; a < space_.splines().width(); ++a)
+                local[a] = stdx::reduce(weight * rows[field].v * load(basis.by_point[0][a]));
+            space_.add(e, field, local, out);
         }
+    });
 }
 
 void CurveForms::add_sliding_slopes(const double* x, double* values) const {
-    const SplineSpace& splines = space_.splines();
-    const int w = splines.width();
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const Pack weight = images_ * load(basis.weight);
-            const auto rows = sliding_rows<1>(bending_, fixed_H0(), e * splines.groups() + g, Local(space_, e, g, x));
-            const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
-            for (int b = 0; b < 2 * w; ++b) {
+    const int w = space_.splines().width();
+    each_group(space_, x, [&](int e, int i, const auto& basis, const Local& at) {
+        const Pack weight = images_ * load(basis.weight);
+        const auto rows = sliding_rows<1>(bending_, fixed_H0(), i, at);
+        const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+        for (int b = 0; b < 2 * w; ++b)
+            for (int of = 0; of < 2; ++of) {
                 const int by = b / w;
-                const double sign = (by == 0 ? space_.r() : space_.z()).signs(e)[b % w];
-                for (int of = 0; of < 2; ++of) {
-                    Pack slope{0.0};
-                    for (int d = first_derivative[by]; d < 3; ++d)
-                        slope +=
-                            rows[of].d[first_variable[by] + d - first_derivative[by]] * load(basis.by_point[d][b % w]);
-                    const double* signs = (of == 0 ? space_.r() : space_.z()).signs(e);
-                    for (int a = 0; a < w; ++a)
-                        values[slot[b * 2 * w + of * w + a]] +=
-                            sign * signs[a] * stdx::reduce(weight * slope * load(basis.by_point[0][a]));
-                }
+                Pack slope{0.0};
+                for (int d = first_derivative[by]; d < 3; ++d)
+                    slope += rows[of].d[first_variable[by] + d - first_derivative[by]] * load(basis.by_point[d][b % w]);
+                const double sign = space_.field(by).signs(e)[b % w];
+                const double* signs = space_.field(of).signs(e);
+                for (int a = 0; a < w; ++a)
+                    values[slot[b * 2 * w + of * w + a]] +=
+                        sign * signs[a] * stdx::reduce(weight * slope * load(basis.by_point[0][a]));
             }
-        }
+    });
 }
 
 Eigen::VectorXd CurveForms::gradient(const Weights& weights, const Eigen::VectorXd& x) const {
@@ -390,57 +350,48 @@ double CurveForms::value(const Weights& weights, const Eigen::VectorXd& x) const
 }
 
 Eigen::SparseMatrix<double> CurveForms::mass(const Eigen::VectorXd& x) const {
-    const SplineSpace& splines = space_.splines();
-    const int w = splines.width(), rise = space_.shape_size();
+    const int w = space_.splines().width(), rise = space_.shape_size();
     Eigen::SparseMatrix<double> out = pattern_;
     const auto add_rise = [&](int i, double value) {  // of a free period, whose displacement is s e_z
         out.coeffRef(i, rise) += value;
         if (i != rise) out.coeffRef(rise, i) += value;
     };
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const Local at(space_, e, g, x.data());
-            const Pack dS = (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
-            const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
-            if (space_.free_period()) {
-                const Pack s = dS * load(basis.z);
-                add_rise(rise, stdx::reduce(s * load(basis.z)));
-                for (int a = 0; a < w; ++a)
-                    add_rise(space_.r().size() + space_.z().dofs(e)[a],
-                             space_.z().signs(e)[a] * stdx::reduce(s * load(basis.by_point[0][a])));
-            }
-            for (int b = 0; b < w; ++b)
-                for (int a = 0; a < w; ++a) {
-                    const double value = stdx::reduce(dS * load(basis.by_point[0][a]) * load(basis.by_point[0][b]));
-                    const double* r = space_.r().signs(e);
-                    const double* z = space_.z().signs(e);
-                    out.valuePtr()[slot[b * 2 * w + a]] += r[a] * r[b] * value;
-                    out.valuePtr()[slot[(w + b) * 2 * w + w + a]] += z[a] * z[b] * value;
-                }
+    each_group(space_, x.data(), [&](int e, int, const auto& basis, const Local& at) {
+        const Pack dS = (2 * pi * images_) * load(basis.weight) * at.r * stdx::sqrt(at.r1 * at.r1 + at.z1 * at.z1);
+        const int* slot = &slots_[static_cast<std::size_t>(e) * 4 * w * w];
+        const double* r = space_.r().signs(e);
+        const double* z = space_.z().signs(e);
+        if (space_.free_period()) {
+            const Pack s = dS * load(basis.z);
+            add_rise(rise, stdx::reduce(s * load(basis.z)));
+            for (int a = 0; a < w; ++a)
+                add_rise(space_.dof(e, 1, a), z[a] * stdx::reduce(s * load(basis.by_point[0][a])));
         }
+        for (int b = 0; b < w; ++b)
+            for (int a = 0; a < w; ++a) {
+                const double value = stdx::reduce(dS * load(basis.by_point[0][a]) * load(basis.by_point[0][b]));
+                out.valuePtr()[slot[b * 2 * w + a]] += r[a] * r[b] * value;
+                out.valuePtr()[slot[(w + b) * 2 * w + w + a]] += z[a] * z[b] * value;
+            }
+    });
     return out;
 }
 
 double CurveForms::M(const double* x) const {
-    const SplineSpace& splines = space_.splines();
     Pack sum{0.0};
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const Local at(space_, e, g, x);
-            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            sum += load(splines.basis(e, g).weight) * p.area * p.H;
-        }
+    each_group(space_, x, [&](int, int, const auto& basis, const Local& at) {
+        const auto p = at.point();
+        sum += load(basis.weight) * p.area * p.H;
+    });
     return images_ * stdx::reduce(sum);
 }
 
 bool CurveForms::admissible(const Eigen::VectorXd& x) const {
-    const SplineSpace& splines = space_.splines();
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const Local at(space_, e, g, x.data());
-            if (!(stdx::hmin(at.r) > 0 && stdx::hmin(at.r1 * at.r1 + at.z1 * at.z1) > 0)) return false;
-        }
+    bool regular = true;
+    each_group(space_, x.data(), [&](int, int, const auto&, const Local& at) {
+        regular = regular && stdx::hmin(at.r) > 0 && stdx::hmin(at.r1 * at.r1 + at.z1 * at.z1) > 0;
+    });
+    if (!regular) return false;
     if (W_) {
         const PotentialObservation potential = observe_potential(space_, *W_, bending_.potentials, x.data());
         if (!(std::isfinite(potential.energy) && potential.distance > 0)) return false;
@@ -449,64 +400,56 @@ bool CurveForms::admissible(const Eigen::VectorXd& x) const {
 }
 
 FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
-    const SplineSpace& splines = space_.splines();
     const FormulaDomain::Margin of_place = potential_domain(space_, bending_.potentials, x.data());
     DensityDomain domain(bending_);
     if (!domain.restricted()) return of_place;
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const Local at(space_, e, g, x.data());
-            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
-            for (int i = 0; i < lanes; ++i) domain.look(at_H0[i], p.H[i], p.K[i], splines.basis(e, g).z[i]);
-        }
+    each_group(space_, x.data(), [&](int, int i, const auto& basis, const Local& at) {
+        const auto p = at.point();
+        const Pack at_H0 = H0_of(bending_, H0, i);
+        for (int q = 0; q < lanes; ++q) domain.look(at_H0[q], p.H[q], p.K[q], basis.z[q]);
+    });
     const FormulaDomain::Margin of_density = domain.margin();
     return of_place.value < of_density.value ? of_place : of_density;
 }
 
 CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {
     const SplineSpace& splines = space_.splines();
-    const int n = splines.elements();
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     CurveObservation o;
     Pack area{0.0}, volume{0.0}, gauge{0.0}, length{0.0}, M{0.0};
     std::vector<Pack> terms(count_terms(bending_), Pack(0.0));
-    std::vector<double> stiffness(n, 0.0);
-    for (int e = 0; e < n; ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const auto& basis = splines.basis(e, g);
-            const Local at(space_, e, g, x.data());
-            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            const Pack weight = load(basis.weight), dA = weight * p.area, speed = 1.0 / p.inverse_speed;
-            const Pack q = stretching(at.r1, at.r2, at.z1, at.z2);
-            area += dA, M += dA * p.H;
-            volume += pi * weight * at.r * at.r * at.z1;
-            gauge += 0.5 * weight * q * q;
-            length += weight * speed;
-            const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
-            for_each_value_at(bending_, at_H0, p.H, p.K,
-                              [&](std::size_t i, const Pack& value) { terms[i] += value * dA; });
-            const auto f = density_at(bending_, at_H0, p.H, p.K);
-            const Pack s = principal_symbol(f, p.kappa_theta);
-            const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
-            if (bending_.kg == 0) o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
-            const double size = splines.breaks()[e + 1] - splines.breaks()[e];
-            const Pack ig2 = p.inverse_speed * p.inverse_speed;
-            stiffness[e] += stdx::reduce(dA * ig2 * ig2 * stdx::abs(s));
-            const Pack bent = stdx::max(stdx::abs(low), stdx::abs(high));
-            for (int i = 0; i < lanes; ++i) {
-                o.g_min = std::min(o.g_min, static_cast<double>(speed[i]));
-                o.g_max = std::max(o.g_max, static_cast<double>(speed[i]));
-                if (at.r[i] < o.r_min) o.r_min = at.r[i], o.s_min = basis.z[i];
-                if (at.r[i] > o.r_max) o.r_max = at.r[i], o.s_max = basis.z[i];
-                if (bent[i] > o.curvature) o.curvature = bent[i], o.s_curvature = basis.z[i];
-                if (bending_.kg == 0 && s[i] < o.symbol) o.symbol = s[i], o.s_symbol = basis.z[i];
-                if (bending_.kg == 0 || s[i] >= 0) continue;
-                const double coarse = size * speed[i] * std::sqrt(-s[i] / (2 * bending_.kg));
-                if (coarse > o.coarse) o.coarse = coarse, o.s_coarse = basis.z[i];
-            }
+    std::vector<double> stiffness(splines.elements(), 0.0);
+    each_group(space_, x.data(), [&](int e, int i, const auto& basis, const Local& at) {
+        const auto p = at.point();
+        const Pack weight = load(basis.weight), dA = weight * p.area, speed = 1.0 / p.inverse_speed;
+        const Pack stretch = stretching(at.r1, at.r2, at.z1, at.z2);
+        area += dA, M += dA * p.H;
+        volume += pi * weight * at.r * at.r * at.z1;
+        gauge += 0.5 * weight * stretch * stretch;
+        length += weight * speed;
+        const Pack at_H0 = H0_of(bending_, H0, i);
+        for_each_value_at(bending_, at_H0, p.H, p.K, [&](std::size_t k, const Pack& value) { terms[k] += value * dA; });
+        const auto f = density_at(bending_, at_H0, p.H, p.K);
+        const Pack s = principal_symbol(f, p.kappa_theta);
+        const Pack low = stdx::min(p.kappa_s, p.kappa_theta), high = stdx::max(p.kappa_s, p.kappa_theta);
+        if (bending_.kg == 0) o.symbol_3d = std::min(o.symbol_3d, stdx::hmin(least_principal_symbol(f, low, high)));
+        const double size = splines.breaks()[e + 1] - splines.breaks()[e];
+        const Pack ig2 = p.inverse_speed * p.inverse_speed;
+        stiffness[e] += stdx::reduce(dA * ig2 * ig2 * stdx::abs(s));
+        const Pack bent = stdx::max(stdx::abs(low), stdx::abs(high));
+        for (int q = 0; q < lanes; ++q) {
+            o.g_min = std::min(o.g_min, static_cast<double>(speed[q]));
+            o.g_max = std::max(o.g_max, static_cast<double>(speed[q]));
+            if (at.r[q] < o.r_min) o.r_min = at.r[q], o.s_min = basis.z[q];
+            if (at.r[q] > o.r_max) o.r_max = at.r[q], o.s_max = basis.z[q];
+            if (bent[q] > o.curvature) o.curvature = bent[q], o.s_curvature = basis.z[q];
+            if (bending_.kg == 0 && s[q] < o.symbol) o.symbol = s[q], o.s_symbol = basis.z[q];
+            if (bending_.kg == 0 || s[q] >= 0) continue;
+            const double coarse = size * speed[q] * std::sqrt(-s[q] / (2 * bending_.kg));
+            if (coarse > o.coarse) o.coarse = coarse, o.s_coarse = basis.z[q];
         }
+    });
     o.area = images_ * stdx::reduce(area);
     o.volume = images_ * stdx::reduce(volume);
     o.gauge = images_ * stdx::reduce(gauge);
@@ -528,24 +471,13 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
     const int n = splines.elements(), p = splines.degree();
     const auto& breaks = splines.breaks();
     const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
-    const auto top = [&](int e) {
-        return Eigen::Vector2d(space_.r().top_derivative(x.data(), e),
-                               space_.z().top_derivative(x.data() + space_.r().size(), e));
-    };
-    // Difference quotient of the highest derivative across the knot before element e = 0 ... n, along the normal there.
-    // The highest derivative, of odd order, is odd under reflection where the field is even, and the reverse.
+    // Along the normal at the knots.
+    const std::vector<double> of_r = space_.r().top_jumps(x.data()),
+                              of_z = space_.z().top_jumps(x.data() + space_.offset(1));
     std::vector<double> jump(n + 1);
-    const bool mirror = splines.cell().mirror;
-    const Parity r = space_.r_parity(), z = space_.z_parity();
     for (int e = 0; e <= n; ++e) {
-        Eigen::Vector2d before = top(e > 0 ? e - 1 : n - 1), after = top(e < n ? e : 0);
-        if (mirror && e == 0) before = Eigen::Vector2d(-r.start * after[0], -z.start * after[1]);
-        if (mirror && e == n) after = Eigen::Vector2d(-r.end * before[0], -z.end * before[1]);
-        if ((e == 0 && splines.cell().open_start) || (e == n && splines.cell().open_end)) continue;
-        const double left = size(e > 0 ? e - 1 : mirror ? 0 : n - 1), right = size(e < n ? e : mirror ? n - 1 : 0);
         const CurveSample at = space_.evaluate(x, breaks[e]);
-        const Eigen::Vector2d normal = Eigen::Vector2d(at.z1, -at.r1).normalized();
-        jump[e] = 2 * normal.dot(after - before) / (left + right);
+        jump[e] = Eigen::Vector2d(at.z1, -at.r1).normalized().dot(Eigen::Vector2d(of_r[e], of_z[e]));
     }
     if (splines.cell().open_start) jump[0] = jump[1];
     if (splines.cell().open_end) jump[n] = jump[n - 1];
@@ -560,17 +492,13 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
 }
 
 double CurveForms::reference_energy(const Eigen::VectorXd& x) const {
-    const SplineSpace& splines = space_.splines();
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     double magnitude = 0;
-    for (int e = 0; e < splines.elements(); ++e)
-        for (int g = 0; g < splines.groups(); ++g) {
-            const Local at(space_, e, g, x.data());
-            const auto p = profile_point(at.r, at.r1, at.r2, at.z1, at.z2);
-            const Pack dA = p.area * load(splines.basis(e, g).weight);
-            const Pack at_H0 = H0_of(bending_, H0, e * splines.groups() + g);
-            for (int i = 0; i < lanes; ++i) magnitude += tubule::magnitude(bending_, at_H0[i], p.H[i], p.K[i]) * dA[i];
-        }
+    each_group(space_, x.data(), [&](int, int i, const auto& basis, const Local& at) {
+        const auto p = at.point();
+        const Pack dA = p.area * load(basis.weight), at_H0 = H0_of(bending_, H0, i);
+        for (int q = 0; q < lanes; ++q) magnitude += tubule::magnitude(bending_, at_H0[q], p.H[q], p.K[q]) * dA[q];
+    });
     const CurveObservation o = observe(x);
     if (space_.is_patch())
         magnitude += patch_scale(bending_, std::max(space_.evaluate(x, 0).r, space_.evaluate(x, 1).r));

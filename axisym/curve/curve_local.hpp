@@ -23,6 +23,7 @@ struct CurveLocal {
         }
     }
 
+    auto point() const { return profile_point(r, r1, r2, z1, z2); }
     // Curvatures and area as jets in (r, r', r'', z', z'').
     template <int Order>
     auto point() const {
@@ -31,6 +32,14 @@ struct CurveLocal {
                              J::variable(z2, 4));
     }
 };
+
+// visit(e, number of the group, basis, curve there) for each group of points.
+template <class Visit>
+void each_group(const CurveSpace& space, const double* x, const Visit& visit) {
+    const SplineSpace& splines = space.splines();
+    for (int e = 0, i = 0; e < splines.elements(); ++e)
+        for (int g = 0; g < splines.groups(); ++g, ++i) visit(e, i, splines.basis(e, g), CurveLocal(space, e, g, x));
+}
 
 // Derivatives that r and z enter with: of r the zeroth to second, of z the first and second.
 inline constexpr int first_derivative[2] = {0, 1}, first_variable[2] = {0, 3};

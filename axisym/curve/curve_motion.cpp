@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "axisym/splines/element_pattern.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/sparse.hpp"
@@ -219,15 +220,11 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     set_pattern();
 }
 
-// The place of an entry in the values of a matrix with pattern().
 int CurveMotion::slot_of(int row, int column) const {
-    const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column];
-    const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[column + 1];
-    return static_cast<int>(std::lower_bound(begin, end, row) - pattern_.innerIndexPtr());
+    return tubule::axisym::slot_of(pattern_, row, column);
 }
 
 void CurveMotion::set_pattern() {
-    const int n = space().splines().elements();
     for (int part = 0; part < n_fields; ++part) local_size_ += parts_[part].offset < 0 ? 0 : width(part);
     const auto local_dofs = [&](int e) {  // -1: absent
         std::vector<int> dofs;
@@ -238,25 +235,8 @@ void CurveMotion::set_pattern() {
         }
         return dofs;
     };
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int e = 0; e < n; ++e) {
-        const std::vector<int> dofs = local_dofs(e);
-        for (const int column : dofs)
-            for (const int row : dofs)
-                if (row >= 0 && column >= 0) entries.emplace_back(row, column, 0.0);
-    }
-    for (const int number : numbers_)
-        for (int i = 0; i < at_.size; ++i) {
-            entries.emplace_back(number, i, 0.0);
-            entries.emplace_back(i, number, 0.0);
-        }
-    pattern_.resize(at_.size, at_.size);
-    pattern_.setFromTriplets(entries.begin(), entries.end());
-    for (int e = 0; e < n; ++e) {
-        const std::vector<int> dofs = local_dofs(e);
-        for (const int column : dofs)
-            for (const int row : dofs) slots_.push_back(row < 0 || column < 0 ? 0 : slot_of(row, column));
-    }
+    auto [pattern, slots] = element_pattern(at_.size, space().splines().elements(), local_dofs, numbers_);
+    pattern_ = std::move(pattern), slots_ = std::move(slots);
     const Eigen::SparseMatrix<double>& of_forms = forms_.pattern();
     for (int column = 0; column < of_forms.cols(); ++column)
         for (Eigen::SparseMatrix<double>::InnerIterator it(of_forms, column); it; ++it) {

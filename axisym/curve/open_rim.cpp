@@ -12,10 +12,9 @@ OpenRim::OpenRim(const CurveSpace& space, int end, Rim rim) : space_(space), out
     space.splines().splines(e, end, 2, values);
     for (int field = 0; field < 2; ++field)
         for (int a = 0; a < width; ++a) {
-            const SplineSpace& f = field == 0 ? space.r() : space.z();
-            const double sign = f.signs(e)[a];
+            const double sign = space.field(field).signs(e)[a];
             if (sign == 0) continue;
-            Dof dof{f.dofs(e)[a] + (field == 0 ? 0 : space.r().size()), {}};
+            Dof dof{space.dof(e, field, a), {}};
             for (int d = 0; d < 3; ++d) dof.at_end[d] = sign * values[d * width + a];
             dofs_[field].push_back(dof);
         }

@@ -20,10 +20,10 @@ struct Local {
     Local(const CurveSpace& space, int e, int g, const double* x) {
         const auto& b = space.splines().basis(e, g);
         for (int field = 0; field < 2; ++field) {
-            const SplineSpace& of = field == 0 ? space.r() : space.z();
-            const double* c = field == 0 ? x : x + space.r().size();
-            for (int a = 0; a < space.splines().width(); ++a)
-                for (int d = 0; d < 2; ++d) v[field][d] += of.signs(e)[a] * c[of.dofs(e)[a]] * load(b.by_point[d][a]);
+            const SplineSpace& of = space.field(field);
+            for (int a = 0; a < of.width(); ++a)
+                for (int d = 0; d < 2; ++d)
+                    v[field][d] += of.signs(e)[a] * x[space.dof(e, field, a)] * load(b.by_point[d][a]);
         }
         v[1][0] += space.rise(x) * load(b.z), v[1][1] += space.rise(x);
     }
@@ -110,12 +110,11 @@ void add_potential_gradient(const CurveSpace& space, const Formula& W, double we
         const Jet<Pack, 4, 1> f = density<1>(W, at, p);
         const Pack factor = weight * space.images() * load(basis.weight);
         for (int field = 0; field < 2; ++field) {
-            const SplineSpace& of = field == 0 ? space.r() : space.z();
-            double* to = field == 0 ? out : out + space.r().size();
+            double local[SplineSpace::max_width];
             for (int a = 0; a < space.splines().width(); ++a)
-                to[of.dofs(e)[a]] +=
-                    of.signs(e)[a] * stdx::reduce(factor * (f.d[2 * field] * load(basis.by_point[0][a]) +
-                                                            f.d[2 * field + 1] * load(basis.by_point[1][a])));
+                local[a] = stdx::reduce(factor * (f.d[2 * field] * load(basis.by_point[0][a]) +
+                                                  f.d[2 * field + 1] * load(basis.by_point[1][a])));
+            space.add(e, field, local, out);
         }
     });
 }
@@ -127,7 +126,6 @@ void add_potential_hessian(const CurveSpace& space, const Formula& W, double wei
         const Jet<Pack, 4, 2> f = density<2>(W, at, p);
         const Pack factor = weight * space.images() * load(basis.weight);
         const int* slot = &slots[static_cast<std::size_t>(e) * 4 * w * w];
-        const auto of = [&](int i) -> const SplineSpace& { return i < w ? space.r() : space.z(); };
         for (int b = 0; b < 2 * w; ++b) {
             Pack by[4];  // d(density derivative)/d(coefficient b)
             for (int i = 0; i < 4; ++i)
@@ -136,7 +134,7 @@ void add_potential_hessian(const CurveSpace& space, const Formula& W, double wei
             for (int a = 0; a < 2 * w; ++a) {
                 const int i = 2 * (a / w);
                 values[slot[b * 2 * w + a]] +=
-                    of(a).signs(e)[a % w] * of(b).signs(e)[b % w] *
+                    space.field(a / w).signs(e)[a % w] * space.field(b / w).signs(e)[b % w] *
                     stdx::reduce(by[i] * load(basis.by_point[0][a % w]) + by[i + 1] * load(basis.by_point[1][a % w]));
             }
         }

@@ -33,7 +33,7 @@ Eigen::MatrixXd rim_functionals(const CurveSpace& space, const std::vector<Ring>
         double values[3 * SplineSpace::max_width];
         space.splines().splines(e, s, 1, values);
         for (int a = 0; a < width; ++a) {
-            const int r = space.r().dofs(e)[a], z = space.r().size() + space.z().dofs(e)[a];
+            const int r = space.dof(e, 0, a), z = space.dof(e, 1, a);
             out(r, column) += space.r().signs(e)[a] * values[a];
             out(z, column + 1) += space.z().signs(e)[a] * values[a];
             if (!rings[i].tangent) continue;

@@ -156,7 +156,7 @@ H0ByArea::H0ByArea(const CurveSpace& space, const Bending& bending, const double
     Eigen::VectorXd areas(points);
     for (int i = 0; i < packs; ++i) {
         const CurveLocal p(space, i / splines.groups(), i % splines.groups(), x);
-        at.push_back(profile_point(p.r, p.r1, p.r2, p.z1, p.z2));
+        at.push_back(p.point());
         const Pack area = load(splines.basis(i / splines.groups(), i % splines.groups()).weight) * at.back().area;
         for (int q = 0; q < lanes; ++q) areas[i * lanes + q] = area[q];
     }
@@ -192,15 +192,13 @@ Eigen::MatrixXd H0ByArea::hessian_beyond() const {
     // The row of a point from a jet in (r, r', r'', z', z'').
     const auto add = [&](Eigen::MatrixXd& to, int k, double factor, const auto& jet) {
         const int e = k / lanes / splines.groups(), g = k / lanes % splines.groups(), q = k % lanes;
-        for (int field = 0; field < 2; ++field) {
-            const SplineSpace& f = field == 0 ? space_.r() : space_.z();
+        for (int field = 0; field < 2; ++field)
             for (int d = first_derivative[field]; d < 3; ++d) {
                 const double c = factor * jet.d[first_variable[field] + d - first_derivative[field]][q];
                 for (int a = 0; a < splines.width(); ++a)
-                    to(k, f.dofs(e)[a] + (field == 0 ? 0 : space_.r().size())) +=
-                        c * f.signs(e)[a] * splines.basis(e, g).by_spline[q][d][a];
+                    to(k, space_.dof(e, field, a)) +=
+                        c * space_.field(field).signs(e)[a] * splines.basis(e, g).by_spline[q][d][a];
             }
-        }
     };
     for (int i = 0; i < points / lanes; ++i) {
         const int e = i / splines.groups(), g = i % splines.groups();

@@ -8,6 +8,7 @@
 
 #include "axisym/splines/added_terms.hpp"
 #include "axisym/splines/band_lu.hpp"
+#include "axisym/splines/element_pattern.hpp"
 #include "axisym/splines/pack.hpp"
 #include "common/energy/principal_symbol.hpp"
 #include "common/geometry/profile_point.hpp"
@@ -71,22 +72,13 @@ Jet<Pack, 3, Order> energy_density(const Bending& bending, const Loads& loads, c
 
 Forms::Forms(const SplineSpace& space, const Bending& bending, const Loads& loads)
     : space_(space), bending_(bending), loads_(loads), images_(space.cell().images()) {
-    const int w = space.width(), degree = space.degree();
+    const int degree = space.degree();
     if (degree != 3 && degree != 5 && degree != 7) throw std::invalid_argument("spline degree must be 3, 5 or 7");
     if (bending.kg != 0) gradients_.emplace(space_);
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(space.elements() * w * w);
-    for (int e = 0; e < space.elements(); ++e)
-        for (int b = 0; b < w; ++b)
-            for (int a = 0; a < w; ++a) entries.emplace_back(space.dofs(e)[a], space.dofs(e)[b], 1.0);
-    pattern_.resize(space.size(), space.size());
-    pattern_.setFromTriplets(entries.begin(), entries.end());
-    slots_.reserve(entries.size());
-    for (const auto& t : entries) {
-        const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[t.col()];
-        const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[t.col() + 1];
-        slots_.push_back(static_cast<int>(std::lower_bound(begin, end, t.row()) - pattern_.innerIndexPtr()));
-    }
+    auto [pattern, slots] = element_pattern(space.size(), space.elements(), [&](int e) {
+        return std::vector<int>(space.dofs(e), space.dofs(e) + space.width());
+    });
+    pattern_ = std::move(pattern), slots_ = std::move(slots);
     for (int e = 0; e < space.elements(); ++e)
         defect_scale_.push_back(images_ * space.bernoulli_norm() / 4 *
                                 std::pow(space.breaks()[e + 1] - space.breaks()[e], 2 * (degree - 1)));
@@ -362,23 +354,12 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
     if (!defect) return o;
     std::vector<double> of_gradients;
     if (gradients_) of_gradients = gradients_->stiffness(bending_.kg * space_.bernoulli_norm_of_third() / 4, x);
-    const int n = space_.elements();
-    const auto& breaks = space_.breaks();
-    const auto size = [&](int e) { return breaks[e + 1] - breaks[e]; };
-    const bool mirror = space_.cell().mirror;
-    // Difference quotient of the highest derivative across the knot between two neighbours. It is odd
-    // under reflection.
-    const auto jump = [&](int e, int f, double left, double right) { return 2 * (right - left) / (size(e) + size(f)); };
-    const double first = space_.top_derivative(x, 0), last = space_.top_derivative(x, n - 1);
-    double here = first, previous = mirror ? jump(0, 0, -first, first) : jump(n - 1, 0, last, first);
-    for (int e = 0; e < n; ++e) {
-        const int f = e + 1 < n ? e + 1 : mirror ? e : 0;
-        const double after = e + 1 < n ? space_.top_derivative(x, e + 1) : mirror ? -last : first;
-        const double next = jump(e, f, here, after);
-        double loss = defect_scale_[e] * (*defect)[e];
-        if (gradients_) loss += of_gradients[e] * std::pow(size(e), 2 * (space_.degree() - 2));
-        (*defect)[e] = loss * (next * next + previous * previous);
-        here = after, previous = next;
+    const std::vector<double> jump = space_.top_jumps(x);
+    for (int e = 0; e < space_.elements(); ++e) {
+        double& loss = (*defect)[e] *= defect_scale_[e];
+        if (gradients_)
+            loss += of_gradients[e] * std::pow(space_.breaks()[e + 1] - space_.breaks()[e], 2 * (space_.degree() - 2));
+        loss *= jump[e] * jump[e] + jump[e + 1] * jump[e + 1];
     }
     return o;
 }

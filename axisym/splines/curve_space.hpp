@@ -36,6 +36,18 @@ public:
     const SplineSpace& r() const { return r_; }
     const SplineSpace& z() const { return z_; }
     const SplineSpace& splines() const { return r_; }  // for what r and z have in common
+    // r and z by their number 0, 1; where the coefficients of that field begin; and the coefficient of the active
+    // spline a of element e.
+    const SplineSpace& field(int i) const { return i == 0 ? r_ : z_; }
+    int offset(int i) const { return i == 0 ? 0 : r_.size(); }
+    int dof(int e, int i, int a) const { return offset(i) + field(i).dofs(e)[a]; }
+    // Adds what each active spline of element e in a field contributes to `out`, of size() numbers.
+    void add(int e, int i, const double* local, double* out) const {
+        const SplineSpace& of = field(i);
+        const int* dofs = of.dofs(e);
+        const double* signs = of.signs(e);
+        for (int a = 0; a < of.width(); ++a) out[offset(i) + dofs[a]] += signs[a] * local[a];
+    }
     // Numbers of coefficients: of r and z; and with a free rise, which stands last.
     int shape_size() const { return r_.size() + z_.size(); }
     int size() const { return shape_size() + (free_period_ ? 1 : 0); }

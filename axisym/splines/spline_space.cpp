@@ -220,6 +220,21 @@ double SplineSpace::top_derivative(const double* c, int element) const {
     return sum;
 }
 
+// The derivative, of odd order, is odd under reflection where the spline is even, and the reverse.
+std::vector<double> SplineSpace::top_jumps(const double* c) const {
+    const int n = elements();
+    const Cell& in = cell();
+    const auto size = [&](int e) { return breaks()[e + 1] - breaks()[e]; };
+    std::vector<double> out(n + 1, 0.0);
+    for (int e = in.open_start ? 1 : 0; e <= (in.open_end ? n - 1 : n); ++e) {
+        const int left = e > 0 ? e - 1 : in.mirror ? 0 : n - 1, right = e < n ? e : in.mirror ? n - 1 : 0;
+        const double before = top_derivative(c, left) * (in.mirror && e == 0 ? -parity_.start : 1),
+                     after = top_derivative(c, right) * (in.mirror && e == n ? -parity_.end : 1);
+        out[e] = 2 * (after - before) / (size(left) + size(right));
+    }
+    return out;
+}
+
 Eigen::VectorXd SplineSpace::mean() const {
     Eigen::VectorXd out = Eigen::VectorXd::Zero(size_);
     for (int e = 0; e < elements(); ++e)

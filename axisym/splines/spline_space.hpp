@@ -84,6 +84,8 @@ public:
     void splines(int element, double z, int derivatives, double* out) const;
     // The derivative of order `degree`, constant on each element; and that of each active spline.
     double top_derivative(const double* coefficients, int element) const;
+    // The difference quotients of that derivative across the knots 0 ... elements(); 0 at open ends.
+    std::vector<double> top_jumps(const double* coefficients) const;
     const double* top_derivatives(int element) const { return shared_->active[element].top; }
     // A zero of r' near z, by Newton from z and staying in its neighbourhood: the place of a neck or a belly.
     double extremum_near(const double* coefficients, double z) const;
