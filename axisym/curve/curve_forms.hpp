@@ -10,9 +10,9 @@
 #include <optional>
 #include <vector>
 
-#include "axisym/curve/gradient_forms.hpp"
 #include "axisym/curve/potential_forms.hpp"
 #include "axisym/splines/curve_space.hpp"
+#include "axisym/splines/gradient_forms.hpp"
 #include "common/energy/bending.hpp"
 
 namespace tubule::axisym {
@@ -116,9 +116,9 @@ private:
 
     const CurveSpace& space_;
     Bending bending_;
-    std::optional<Formula> W_;                   // of its potentials
-    std::optional<GradientForms> gradients_;     // where kg > 0
-    std::shared_ptr<const VaryingH0> fixed_H0_;  // none before fix_H0()
+    std::optional<Formula> W_;                            // of its potentials
+    std::optional<GradientForms<CurveSpace>> gradients_;  // where kg > 0
+    std::shared_ptr<const VaryingH0> fixed_H0_;           // none before fix_H0()
     Eigen::VectorXd fixed_on_;
     double images_;
     Eigen::SparseMatrix<double> pattern_;

@@ -348,17 +348,17 @@ Observation Forms::observe(const double* x, const double* v, std::vector<double>
         stiffness = defect->data();
     }
     Observation o = for_degree(space_.degree(), [&](auto P) { return observe_kernel<P()>(x, v, stiffness); });
-    if (gradients_) o.energy += o.energy_kg = bending_.kg * gradients_->value(x);
+    std::vector<double> of_gradients;
+    if (gradients_) o.energy += o.energy_kg = bending_.kg * gradients_->value(x, defect ? &of_gradients : nullptr);
     o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
     o.domain = domain(x);
     if (!defect) return o;
-    std::vector<double> of_gradients;
-    if (gradients_) of_gradients = gradients_->stiffness(bending_.kg * space_.bernoulli_norm_of_third() / 4, x);
     const std::vector<double> jump = space_.top_jumps(x);
     for (int e = 0; e < space_.elements(); ++e) {
         double& loss = (*defect)[e] *= defect_scale_[e];
         if (gradients_)
-            loss += of_gradients[e] * std::pow(space_.breaks()[e + 1] - space_.breaks()[e], 2 * (space_.degree() - 2));
+            loss += bending_.kg * space_.bernoulli_norm_of_third() / 4 * of_gradients[e] *
+                    std::pow(space_.breaks()[e + 1] - space_.breaks()[e], 2 * (space_.degree() - 2));
         loss *= jump[e] * jump[e] + jump[e + 1] * jump[e + 1];
     }
     return o;

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "axisym/graph/graph_gradients.hpp"
+#include "axisym/splines/gradient_forms.hpp"
 #include "axisym/splines/spline_space.hpp"
 #include "common/energy/bending.hpp"
 #include "common/model/model.hpp"
@@ -91,8 +91,8 @@ private:
     const SplineSpace& space_;
     Bending bending_;
     Loads loads_;
-    std::optional<GraphGradients> gradients_;  // where kg > 0
-    double images_;                            // cells in the whole period
+    std::optional<GradientForms<SplineSpace>> gradients_;  // where kg > 0
+    double images_;                                        // cells in the whole period
     Eigen::SparseMatrix<double> pattern_;
     std::vector<double> defect_scale_;  // of each element, see observe()
     std::vector<int> slots_;            // place in pattern_ of the local matrix entries of each element

@@ -42,12 +42,7 @@ public:
     int offset(int i) const { return i == 0 ? 0 : r_.size(); }
     int dof(int e, int i, int a) const { return offset(i) + field(i).dofs(e)[a]; }
     // Adds what each active spline of element e in a field contributes to `out`, of size() numbers.
-    void add(int e, int i, const double* local, double* out) const {
-        const SplineSpace& of = field(i);
-        const int* dofs = of.dofs(e);
-        const double* signs = of.signs(e);
-        for (int a = 0; a < of.width(); ++a) out[offset(i) + dofs[a]] += signs[a] * local[a];
-    }
+    void add(int e, int i, const double* local, double* out) const { field(i).add(e, local, out + offset(i)); }
     // Numbers of coefficients: of r and z; and with a free rise, which stands last.
     int shape_size() const { return r_.size() + z_.size(); }
     int size() const { return shape_size() + (free_period_ ? 1 : 0); }

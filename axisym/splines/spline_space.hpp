@@ -73,6 +73,13 @@ public:
     const int* dofs(int element) const { return &dofs_[element * width()]; }
     const double* signs(int element) const { return &signs_[element * width()]; }
 
+    // Adds what each active spline of an element contributes to `out`, of size() numbers.
+    void add(int element, const double* local, double* out) const {
+        const int* to = dofs(element);
+        const double* sign = signs(element);
+        for (int a = 0; a < width(); ++a) out[to[a]] += sign[a] * local[a];
+    }
+
     int element_at(double z) const;
     // Value, first and second derivative of the spline at z inside `element` (or its ends).
     std::array<double, 3> evaluate(const double* coefficients, int element, double z) const;
