@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "axisym/curve/curve_frame.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/run_output.hpp"

@@ -201,37 +201,4 @@ Eigen::VectorXd fit(const CurveSpace& space, const Curve& meridian) {
     return fit(space, ArcLength(meridian));
 }
 
-std::vector<double> graded_breaks(const std::vector<double>& seams, double largest, double smallest, double growth) {
-    std::vector<double> edges{0}, breaks{0};
-    edges.insert(edges.end(), seams.begin(), seams.end());
-    edges.push_back(1);
-    const auto distance = [&](double s) {
-        double d = 1;
-        for (double seam : seams) d = std::min(d, std::abs(s - seam));
-        return d;
-    };
-    for (std::size_t k = 0; k + 1 < edges.size(); ++k) {
-        // Elements needed up to a point, by steps of a tenth of an element, and equal shares of that.
-        std::vector<double> at{edges[k]}, count{0};
-        const double middle = (edges[k] + edges[k + 1]) / 2;
-        while (at.back() < edges[k + 1]) {
-            const auto size = [&](double s) { return std::min(largest, smallest + growth * distance(s)); };
-            const double here = size(at.back()) / 10;
-            // Towards a seam the size shrinks: step by that of the far end.
-            const double step = at.back() < middle ? here : std::min(here, size(at.back() + here) / 10);
-            const double next = std::min(at.back() + step, edges[k + 1]);
-            count.push_back(count.back() + (next - at.back()) / size((next + at.back()) / 2));
-            at.push_back(next);
-        }
-        const int n = std::max(1, static_cast<int>(std::ceil(count.back() - 0.01)));
-        for (int i = 1, j = 0; i < n; ++i) {
-            const double wanted = count.back() * i / n;
-            while (count[j + 1] < wanted) ++j;
-            breaks.push_back(at[j] + (at[j + 1] - at[j]) * (wanted - count[j]) / (count[j + 1] - count[j]));
-        }
-        breaks.push_back(edges[k + 1]);
-    }
-    return breaks;
-}
-
 }  // namespace tubule::axisym

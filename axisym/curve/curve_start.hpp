@@ -53,9 +53,4 @@ private:
 Eigen::VectorXd fit(const CurveSpace& space, const ArcLength& curve);
 Eigen::VectorXd fit(const CurveSpace& space, const Curve& meridian);
 
-// Breaks that include the seams (fractions, ascending), with elements of size `smallest` at a seam that grow by
-// `growth` per distance up to `largest`.
-std::vector<double> graded_breaks(const std::vector<double>& seams, double largest, double smallest,
-                                  double growth = 0.4);
-
 }  // namespace tubule::axisym

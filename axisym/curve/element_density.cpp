@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "axisym/splines/breaks.hpp"
+
 namespace tubule::axisym {
 namespace {
 
@@ -47,17 +49,9 @@ ElementDensity MeshNeed::density() const {
 
 std::vector<double> breaks_of(ElementDensity density, int elements) {
     limit_growth(density, elements);
-    const double total = std::accumulate(density.begin(), density.end(), 0.0);
-    std::vector<double> breaks{0};
-    double below = 0;
-    for (std::size_t i = 0; i < density.size(); ++i) {
-        const double here = density[i] * elements / total;
-        for (double next = static_cast<double>(breaks.size()); next < below + here && next < elements; ++next)
-            breaks.push_back((static_cast<double>(i) + (next - below) / here) / static_cast<double>(density.size()));
-        below += here;
-    }
-    breaks.push_back(1);
-    return breaks;
+    std::vector<double> count{0};
+    for (const double value : density) count.push_back(count.back() + value);
+    return equal_shares(equal_breaks(static_cast<int>(density.size())), count, elements);
 }
 
 }  // namespace tubule::axisym

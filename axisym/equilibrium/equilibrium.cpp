@@ -12,6 +12,7 @@
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/equilibrium/newton.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/dense.hpp"
@@ -257,22 +258,6 @@ void scale_to(const CurveForms& forms, const Constraints& c, Eigen::VectorXd& x)
     x *= c.area ? std::sqrt(*c.area / o.area) : std::cbrt(*c.volume / o.volume);
 }
 
-}  // namespace
-
-std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
-    const int n = static_cast<int>(breaks.size()) - 1;
-    std::vector<double> out(elements + 1);
-    for (int i = 0; i <= elements; ++i) {
-        const double at = static_cast<double>(i) * n / elements;
-        const int e = std::min(static_cast<int>(at), n - 1);
-        out[i] = breaks[e] + (at - e) * (breaks[e + 1] - breaks[e]);
-    }
-    out.back() = 1;
-    return out;
-}
-
-namespace {
-
 // Estimates the error on the last mesh from the energies on a sequence of meshes.
 class MeshComparison {
 public:
@@ -293,7 +278,7 @@ public:
     void restart() { elements_ = 0, change_ = 0; }
 
 private:
-    static constexpr double unseen = 2;  // two meshes do not show the order
+    static constexpr double unseen = 2;           // two meshes do not show the order
     double energy_ = 0, change_ = 0, falls_ = 1;  // the change to the last mesh, and by how much the next one is less
     int elements_ = 0;
 };

@@ -161,7 +161,4 @@ int directions_without_mirror(const StationaryProblem& problem, const Equilibriu
 int directions_down(const StationarySystem& system, const Eigen::VectorXd& u, const Equilibrium& shape,
                     double accuracy);
 
-// The same grading with another number of elements.
-std::vector<double> regraded(const std::vector<double>& breaks, int elements);
-
 }  // namespace tubule::axisym

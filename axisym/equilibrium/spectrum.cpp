@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/dense.hpp"
 #include "common/solve/pause.hpp"

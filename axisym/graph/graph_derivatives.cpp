@@ -1,6 +1,7 @@
 #include "axisym/graph/graph_derivatives.hpp"
 
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 
 namespace tubule::axisym {
 
@@ -34,7 +35,7 @@ std::vector<TermCheck> check_terms(const Problem& c) {
     const Tube& tube = std::get<Tube>(c.shape);
     const Cell cell = cell_of(tube, c.discretisation.symmetry);
     const int order = c.discretisation.order;
-    const SplineSpace space(cell, uniform_breaks(cell, 12), order, c.discretisation.smoothness.value_or(order - 1));
+    const SplineSpace space(cell, equal_breaks(12, cell), order, c.discretisation.smoothness.value_or(order - 1));
     const Forms forms(space, c.energy);
     return check_terms(forms, space.project([&](double z) { return radius_at(tube, z); }));
 }

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "axisym/splines/band_lu.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/solve/sparse.hpp"
 
@@ -81,13 +82,6 @@ Cell cell_of(const Tube& tube, bool symmetry) {
     const double period = tube.length / waves;
     if (const auto z = mirror_plane(modes, tube.length)) return {*z, *z + period / 2, true, waves};
     return {0, period, false, waves};
-}
-
-std::vector<double> uniform_breaks(const Cell& cell, int n) {
-    std::vector<double> breaks(n + 1);
-    for (int i = 0; i <= n; ++i) breaks[i] = cell.z0 + cell.length() * i / n;
-    breaks.back() = cell.z1;
-    return breaks;
 }
 
 std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span) {
@@ -163,18 +157,11 @@ Density wanted_density(const SplineSpace& space, const std::vector<double>& defe
 std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
                                    int fewest, int most) {
     const Density d = wanted_density(space, defect, target, fewest);
-    const int elements = std::max(fewest, static_cast<int>(std::min<double>(std::ceil(d.integral()), most)));
-    const double share = d.integral() / elements;
-    std::vector<double> breaks{space.cell().z0};
-    double sum = 0;
-    for (std::size_t i = 0; i < d.value.size(); ++i) {
-        const double here = d.value[i] * d.width(static_cast<int>(i));
-        while (static_cast<int>(breaks.size()) < elements && sum + here >= share * breaks.size())
-            breaks.push_back(d.edges[i] + d.width(static_cast<int>(i)) * (share * breaks.size() - sum) / here);
-        sum += here;
-    }
-    breaks.push_back(space.cell().z1);
-    return breaks;
+    std::vector<double> count{0};
+    for (std::size_t i = 0; i < d.value.size(); ++i)
+        count.push_back(count.back() + d.value[i] * d.width(static_cast<int>(i)));
+    const int elements = std::max(fewest, static_cast<int>(std::min<double>(std::ceil(count.back()), most)));
+    return equal_shares(d.edges, count, elements);
 }
 
 std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
@@ -244,7 +231,7 @@ std::vector<double> initial_breaks(const Problem& c, const GraphSettings& settin
     for (const TubeMode& mode : std::get<Tube>(c.shape).modes) most_waves = std::max(most_waves, mode.n);
     const int first = d.elements ? std::max(2, (*d.elements + cell.images() - 1) / cell.images())
                                  : std::max(fewest_elements, 8 * most_waves / cell.images());
-    std::vector<double> breaks = uniform_breaks(cell, first);
+    std::vector<double> breaks = equal_breaks(first, cell);
     for (int pass = 0;; ++pass) {
         const SplineSpace space = space_of(cell, breaks, c);
         const Forms forms(space, c.energy, graph_loads(c));

@@ -49,9 +49,6 @@ std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<d
 // grows its sharpest features within its first instants.
 std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span);
 
-// Breaks of n equal elements.
-std::vector<double> uniform_breaks(const Cell& cell, int n);
-
 constexpr int most_graph_elements = 4000;  // of one cell
 
 // Tension and pressure, the same at all times: what changes is computed as a curve.

@@ -61,10 +61,4 @@ Eigen::VectorXd CurveSpace::prolong(const CurveSpace& other, const Eigen::Vector
     return out;
 }
 
-std::vector<double> equal_breaks(int n) {
-    std::vector<double> breaks(n + 1);
-    for (int i = 0; i <= n; ++i) breaks[i] = static_cast<double>(i) / n;
-    return breaks;
-}
-
 }  // namespace tubule::axisym

@@ -71,7 +71,4 @@ private:
     SplineSpace r_, z_;
 };
 
-// Breaks of n equal elements of [0, 1].
-std::vector<double> equal_breaks(int n);
-
 }  // namespace tubule::axisym

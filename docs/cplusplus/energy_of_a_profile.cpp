@@ -7,6 +7,7 @@
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/shapes/perturbed_curve.hpp"
 
 using namespace tubule;

@@ -8,6 +8,7 @@
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/dense.hpp"
 #include "common/solve/derivative_check.hpp"

@@ -8,6 +8,7 @@
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/equilibrium/equilibrium_task.hpp"
 #include "common/geometry/profile_point.hpp"

@@ -8,6 +8,7 @@
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/derivative_check.hpp"
 #include "tests/axisym/runs.hpp"
@@ -263,7 +264,7 @@ TEST(CurveForms, tubesAgreeWithTheirGraphs) {
     const Tube tube{1, 2, {{0.3, 1, 0, 0.4}, {0.05, 3, 0, 0}}};
     const Bending law = bending(0.2, -2, 0.03, 0.06);
     const Cell cell{0, 2, false, 1};
-    const SplineSpace space(cell, uniform_breaks(cell, 80), 7, 6);
+    const SplineSpace space(cell, equal_breaks(80, cell), 7, 6);
     const Vector x = space.project([&](double z) { return radius_at(tube, z); }), rest = Vector::Zero(x.size());
     const Observation graph = Forms(space, law).observe(x.data(), rest.data());
     const auto curve = observe(meridian(tube), law, 160);

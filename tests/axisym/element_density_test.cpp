@@ -5,6 +5,7 @@
 
 #include <numeric>
 
+#include "axisym/splines/breaks.hpp"
 #include "axisym/splines/curve_space.hpp"
 #include "common/case/read.hpp"
 #include "tests/axisym/runs.hpp"

@@ -9,6 +9,7 @@
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/theory/vesiculation.hpp"
 #include "tests/axisym/runs.hpp"

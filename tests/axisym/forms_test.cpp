@@ -7,6 +7,7 @@
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/axisym/series.hpp"
@@ -29,7 +30,7 @@ TEST(Forms, gradientAndHessianOfEachTermAndOfAll) {
     for (int degree : {3, 5, 7})
         for (const Cell& cell : {whole, half})
             for (const Bending& material : {bending(0.2, -2, 0.03, 0.06), bending(1, 0.7, 0.2, -0.4)}) {
-                const SplineSpace space(cell, uniform_breaks(cell, 7), degree, degree - 1);
+                const SplineSpace space(cell, equal_breaks(7, cell), degree, degree - 1);
                 const Forms forms(space, material, {.tension = 0.7, .pressure = -1.3});
                 const Vector x = rough(space.size());
                 const auto checks = check_terms(forms, x);
@@ -47,7 +48,7 @@ TEST(Forms, gradientAndHessianOfEachTermAndOfAll) {
 }
 
 TEST(Forms, refusesEvenDegrees) {
-    const SplineSpace space(whole, uniform_breaks(whole, 5), 4, 3);
+    const SplineSpace space(whole, equal_breaks(5, whole), 4, 3);
     EXPECT_EQ(test::message_of<std::invalid_argument>([&] { Forms(space, bending(1)); }),
               "spline degree must be 3, 5 or 7");
 }
@@ -67,7 +68,7 @@ TEST(Forms, jacobianIsThatOfTheResidual) {
     std::normal_distribution<double> normal;
     for (int degree : {3, 5, 7})
         for (const Cell& cell : {whole, half}) {
-            const SplineSpace space(cell, uniform_breaks(cell, 6), degree, degree - 1);
+            const SplineSpace space(cell, equal_breaks(6, cell), degree, degree - 1);
             const Forms forms(space, bending(0.2, -2, 0.03, 0.06));
             const int n = space.size();
             const Vector x = rough(n);
@@ -93,7 +94,7 @@ TEST(Forms, jacobianIsThatOfTheResidual) {
 }
 
 TEST(Forms, residualTellsWhenTheRadiusIsNotPositive) {
-    const SplineSpace space(whole, uniform_breaks(whole, 6), 5, 4);
+    const SplineSpace space(whole, equal_breaks(6, whole), 5, 4);
     const Forms forms(space, bending(0.2, -2));
     Vector F(space.size()), rest = Vector::Zero(space.size());
     Vector x = Vector::Ones(space.size());
@@ -109,7 +110,7 @@ TEST(Forms, uniformTubeIsExact) {
     const double f = k20 * h * h + k40 * h * h * h * h, fH = 2 * k20 * h + 4 * k40 * h * h * h;
     for (int degree : {3, 5, 7})
         for (const Cell& cell : {whole, half, Cell{0, 0.5, true, 2}}) {
-            const SplineSpace space(cell, uniform_breaks(cell, 5), degree, degree - 1);
+            const SplineSpace space(cell, equal_breaks(5, cell), degree, degree - 1);
             const Forms forms(space, bending(k20, H0, k40, 0.06));
             const Vector x = Vector::Constant(space.size(), R), v = forms.rate(x);
             const Observation o = forms.observe(x.data(), v.data());
@@ -149,7 +150,7 @@ TEST(Forms, integralsAgainstDenseQuadrature) {
         r_min = std::min(r_min, r(z)), r_max = std::max(r_max, r(z));
     }
     for (int degree : {5, 7}) {
-        const SplineSpace space(whole, uniform_breaks(whole, 80), degree, degree - 1);
+        const SplineSpace space(whole, equal_breaks(80, whole), degree, degree - 1);
         const Forms forms(space, bending(k20, H0, k40, k42));
         const Vector x = space.project(r), rest = Vector::Zero(x.size());
         const Observation o = forms.observe(x.data(), rest.data());
@@ -174,7 +175,7 @@ TEST(Forms, integralsAgainstDenseQuadrature) {
 
 TEST(Forms, rateDissipatesTheDiscreteEnergy) {
     // Theorem: M v = -grad E gives dE/dt = -v.M v, the observed dissipation; at any state, however rough.
-    const SplineSpace space(whole, uniform_breaks(whole, 8), 5, 4);
+    const SplineSpace space(whole, equal_breaks(8, whole), 5, 4);
     const Forms forms(space, bending(0.2, -2, 0.03, 0.06));
     const Vector x = rough(space.size()), v = forms.rate(x);
     const double change = forms.gradient(x).dot(v), dissipation = forms.observe(x.data(), v.data()).dissipation;
@@ -218,7 +219,7 @@ TEST(StrongForce, ofSphereAndTube) {
 
 // Largest defect of grad E_h . w = -INT 2 pi r b w dz over some smooth w, for one modulus of 1 alone.
 double force_error(int term, double H0, int degree, int elements) {
-    const SplineSpace space(whole, uniform_breaks(whole, elements), degree, degree - 1);
+    const SplineSpace space(whole, equal_breaks(elements, whole), degree, degree - 1);
     Bending material{.k = {}, .H0 = H0};
     material.k[term] = 1;
     const Forms forms(space, material);

@@ -10,6 +10,7 @@
 #include "axisym/equilibrium/spectrum.hpp"
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/result/start_frame.hpp"
 #include "common/solve/derivative_check.hpp"
@@ -58,7 +59,7 @@ TEST(Gradients, formsHaveTheirDerivatives) {
     EXPECT_NEAR(forms.stretch_slope({.energy = 1}, x), (stretched(1e-5) - stretched(-1e-5)) / 2e-5, 1e-7);
     const Cell cell{0, 3, false, 1};
     for (const int degree : {3, 5, 7}) {
-        const SplineSpace graph(cell, uniform_breaks(cell, 12), degree, degree - 1);
+        const SplineSpace graph(cell, equal_breaks(12, cell), degree, degree - 1);
         const Eigen::VectorXd r = graph.project([](double z) { return 1 + 0.2 * std::cos(2 * pi * z / 3 + 0.4); });
         for (const TermCheck& one : check_terms(Forms(graph, energy), r))
             EXPECT_TRUE(one.check.pass()) << one.key << one.check.text();

@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "axisym/equilibrium/continuation.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
 

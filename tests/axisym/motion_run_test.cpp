@@ -9,6 +9,7 @@
 #include "axisym/curve/curve_run.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/run.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/sphere.hpp"

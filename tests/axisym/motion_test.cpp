@@ -3,6 +3,7 @@
 
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_start.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/shapes/tube.hpp"

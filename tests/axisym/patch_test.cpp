@@ -8,6 +8,7 @@
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/start_frame.hpp"

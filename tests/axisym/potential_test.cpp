@@ -6,6 +6,7 @@
 
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/derivative_check.hpp"

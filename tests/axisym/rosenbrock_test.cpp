@@ -10,6 +10,7 @@
 #include "axisym/integration/step_integral.hpp"
 #include "axisym/integration/time_integrator.hpp"
 #include "axisym/splines/band_lu.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/solve/sparse.hpp"
 #include "tests/axisym/runs.hpp"
 #include "tests/support/message_of.hpp"
@@ -165,7 +166,7 @@ TEST(BandLu, solves) {
     for (const bool mirror : {true, false})
         for (const int elements : {2, 3, 9, 40}) {
             const Cell cell{0, 1, mirror, 1};
-            const SplineSpace space(cell, uniform_breaks(cell, elements), 5, 4);
+            const SplineSpace space(cell, equal_breaks(elements, cell), 5, 4);
             Eigen::SparseMatrix<double> A = Forms(space, bending(1, 0)).pattern();
             for (int k = 0; k < A.nonZeros(); ++k) A.valuePtr()[k] = normal(engine);
             const Eigen::VectorXd b = Eigen::VectorXd::Random(A.cols());

@@ -6,6 +6,7 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "axisym/splines/spline_space.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "tests/axisym/runs.hpp"
@@ -246,7 +247,7 @@ TEST(SplineSpace, approximatesWithFullOrder) {
         double error[2];
         const int n[2] = {10, 20};
         for (int i = 0; i < 2; ++i) {
-            const SplineSpace space(periodic, uniform_breaks(periodic, n[i]), k.degree, k.smoothness);
+            const SplineSpace space(periodic, equal_breaks(n[i], periodic), k.degree, k.smoothness);
             const Vector x = space.project(f);
             double sum = 0;
             for (int j = 0; j < 1000; ++j) {

@@ -11,6 +11,7 @@
 
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/theory/dispersion.hpp"
@@ -40,7 +41,7 @@ TEST(Dispersion, theGraphsLinearisedOperator) {
           UniformTube{with_terms(bending(0.2, -0.5), {formula(0.3, "sqrt(1 + (H - H0)^2 + K^2) + exp(H)*K")}), 0.8}}) {
         const double length = 3;
         const Cell cell{0, length, false, 1};
-        const SplineSpace space(cell, uniform_breaks(cell, 32), 7, 6);
+        const SplineSpace space(cell, equal_breaks(32, cell), 7, 6);
         const Forms forms(space, tube.energy);
         const Eigen::VectorXd x = space.project([&](double) { return tube.radius; }), rate = forms.rate(x);
         EXPECT_NEAR(rate.mean(), radius_rate(tube), 1e-9);

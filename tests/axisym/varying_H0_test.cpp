@@ -8,6 +8,7 @@
 #include "axisym/curve/curve_forms.hpp"
 #include "axisym/curve/curve_start.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/energy/H0_variables.hpp"
 #include "common/solve/derivative_check.hpp"

@@ -5,6 +5,7 @@
 
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/breaks.hpp"
 #include "tests/studies/benchmark/figure_case.hpp"
 
 namespace tubule::axisym {
@@ -38,7 +39,7 @@ struct Kernel {
     Eigen::VectorXd x, v, out;
     std::vector<double> values;
     explicit Kernel(int degree)
-        : space(cell, uniform_breaks(cell, 8), degree, degree - 1),
+        : space(cell, equal_breaks(8, cell), degree, degree - 1),
           forms(space, figure_case().energy),
           x(space.project([](double z) { return 1 + 0.25 * std::sin(std::numbers::pi * z); })),
           v(forms.rate(x)),
