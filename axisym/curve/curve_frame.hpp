@@ -3,7 +3,7 @@
 
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_settings.hpp"
-#include "axisym/curve/curve_start.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/run/energy_trace.hpp"

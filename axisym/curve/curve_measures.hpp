@@ -5,7 +5,7 @@
 #include <array>
 #include <optional>
 
-#include "axisym/curve/curve_start.hpp"
+#include "axisym/splines/arc_length.hpp"
 
 namespace tubule::axisym {
 

@@ -7,9 +7,9 @@
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_series.hpp"
 #include "axisym/curve/curve_settings.hpp"
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/integration/time_integrator.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "common/case/problem.hpp"
 #include "common/solve/derivative_check.hpp"
 

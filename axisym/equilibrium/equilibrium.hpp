@@ -12,8 +12,8 @@
 
 #include "axisym/curve/bead_forms.hpp"
 #include "axisym/curve/curve_forms.hpp"
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/curve/rim_conditions.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "common/equilibrium/stationary_problem.hpp"
 #include "common/solve/sparse.hpp"
 #include "common/solve/stop.hpp"

@@ -13,6 +13,7 @@
 #include "axisym/curve/curve_samples.hpp"
 #include "axisym/curve/curve_setup.hpp"
 #include "axisym/curve/shape_integrals.hpp"
+#include "axisym/curve/vesicle_families.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/equilibrium.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"

@@ -1,7 +1,7 @@
 // Amplitudes of waves on a profile.
 #pragma once
 
-#include "axisym/curve/curve_start.hpp"
+#include "axisym/splines/arc_length.hpp"
 
 namespace tubule::axisym {
 

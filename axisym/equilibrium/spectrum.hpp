@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "common/case/equilibrium_choices.hpp"
 
 namespace tubule::axisym {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "axisym/curve/curve_forms.hpp"
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/shapes/perturbed_curve.hpp"
 

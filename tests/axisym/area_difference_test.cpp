@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_measures.hpp"
+#include "axisym/curve/vesicle_families.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/equilibrium/spectrum.hpp"

@@ -5,9 +5,9 @@
 #include <random>
 
 #include "axisym/curve/curve_forms.hpp"
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/graph/graph_forms.hpp"
 #include "axisym/graph/graph_mesh.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/derivative_check.hpp"

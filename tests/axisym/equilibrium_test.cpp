@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_measures.hpp"
+#include "axisym/curve/vesicle_families.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "axisym/splines/breaks.hpp"

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 
+#include "axisym/curve/vesicle_families.hpp"
 #include "axisym/equilibrium/continuation.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"

@@ -7,8 +7,8 @@
 
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_run.hpp"
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/run.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "axisym/curve/curve_motion.hpp"
-#include "axisym/curve/curve_start.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/torus.hpp"

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "axisym/curve/curve_forms.hpp"
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/energy/H0_variables.hpp"

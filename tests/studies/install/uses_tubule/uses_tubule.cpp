@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "axisym/curve/curve_start.hpp"
 #include "axisym/curve/shape_integrals.hpp"
+#include "axisym/splines/arc_length.hpp"
 #include "common/case/read.hpp"
 #include "surface3d/run/run.hpp"
 

@@ -1,24 +1,14 @@
-// From exact curves to splines in proportion to arc length.
+// Exact curves and splines: one from the other, in proportion to arc length.
 #pragma once
 
 #include <array>
-#include <functional>
-#include <memory>
 #include <vector>
 
 #include "axisym/splines/curve_space.hpp"
 #include "common/shapes/curve.hpp"
-#include "common/shapes/ellipsoid.hpp"
 
 namespace tubule::axisym {
 
-// First guesses for the families of vesicles: a spheroid of this reduced volume (0 < v < 1) and the area 4 pi, prolate
-// or oblate; two spheres (1/sqrt 2 < v < 1) joined by a round neck, the smaller one above; and a bowl, the shell
-// between spheres of the radii 1 and 1 - thickness, open above the polar angle `opening` from its bottom, with a round
-// rim.
-Curve spheroid(double reduced_volume, bool prolate);
-Curve pear(double reduced_volume);
-Curve bowl(double thickness, double opening);
 // The curve times a factor.
 Curve scaled(const Curve& meridian, double factor);
 // An existing curve, which is copied.
