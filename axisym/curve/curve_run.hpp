@@ -1,7 +1,7 @@
 // A case of tier "axisym" whose profile is a curve (r(s), z(s)): every model, closed cells, and tubes that overhang.
 #pragma once
 
-#include "axisym/curve/curve_series.hpp"
+#include "axisym/curve/curve_output.hpp"
 #include "common/run/run.hpp"
 
 namespace tubule::axisym {

@@ -3,9 +3,8 @@
 
 #include <memory>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_motion.hpp"
-#include "axisym/curve/curve_series.hpp"
+#include "axisym/curve/curve_output.hpp"
 #include "axisym/curve/curve_settings.hpp"
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/integration/time_integrator.hpp"
@@ -16,6 +15,13 @@
 namespace tubule::axisym {
 
 CurveLaw law_of(const Problem& c);
+
+// The initial shape of a case. Throws CaseError for a result without a frame of this tier.
+Curve initial_curve(const Problem& c);
+
+// The curve of the frame that a case begins with, with its velocity, where the case asks for that. Throws CaseError
+// where the frame has none.
+std::optional<PerturbedCurve> initial_velocity(const Problem& c);
 
 // The initial shape of all runs of a case: half of the profile if it is symmetric and the case allows it.
 struct InitialShape {
@@ -28,12 +34,6 @@ struct InitialShape {
     double free_energy(const MotionLaw& law) const;  // F, theory.md (3.16), with the loads of t = 0
 };
 InitialShape initial_shape(const Problem& c);
-// The distance of the beads of a case on this shape. CaseError where they do not suit it.
-double bead_distance(const Problem& c, const Curve& shape);
-// CaseError where a case asks of a patch what it has not.
-void require_patch(const Problem& c, const Curve& shape);
-// CaseError where the potentials of places of a case do not suit this shape.
-void require_place(const Problem& c, const Curve& shape);
 
 // Taylor slopes of alpha/2 (M - M0)^2 at the initial shape of a tube, with what its Hessian has of rank one.
 DerivativeCheck check_area_differences(const Problem& c);

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "axisym/curve/coarser_curve.hpp"
-#include "axisym/curve/curve_series.hpp"
 #include "common/run/energy_checks.hpp"
 #include "common/run/stall.hpp"
 #include "common/solve/sparse.hpp"

@@ -5,8 +5,8 @@
 #include <memory>
 #include <optional>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_guards.hpp"
+#include "axisym/curve/curve_output.hpp"
 #include "axisym/curve/curve_setup.hpp"
 #include "axisym/integration/time_integrator.hpp"
 #include "common/run/energy_trace.hpp"

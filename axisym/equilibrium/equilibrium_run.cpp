@@ -8,8 +8,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/curve/curve_measures.hpp"
+#include "axisym/curve/curve_requirements.hpp"
 #include "axisym/curve/curve_samples.hpp"
 #include "axisym/curve/curve_setup.hpp"
 #include "axisym/curve/shape_integrals.hpp"

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_output.hpp"
 #include "axisym/graph/graph_output.hpp"
 #include "axisym/run.hpp"
 #include "common/case/read.hpp"

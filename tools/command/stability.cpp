@@ -14,7 +14,6 @@
 #include <stdexcept>
 #include <variant>
 
-#include "axisym/curve/curve_frame.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/equilibrium/profile_modes.hpp"
 #include "common/case/read.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_setup.hpp"
 #include "axisym/equilibrium/spectrum.hpp"
 #include "common/result/frame_profile.hpp"
 #include "tools/command/output.hpp"

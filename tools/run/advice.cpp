@@ -9,7 +9,7 @@
 #include <string>
 #include <variant>
 
-#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_setup.hpp"
 #include "common/case/read.hpp"
 #include "common/run/run.hpp"
 #include "common/solve/interrupt.hpp"

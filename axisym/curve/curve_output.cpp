@@ -1,19 +1,28 @@
-#include "axisym/curve/curve_frame.hpp"
+#include "axisym/curve/curve_output.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
-#include <memory>
+#include <set>
 
 #include "axisym/curve/curve_samples.hpp"
-#include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/frame_profile.hpp"
-#include "common/result/start_frame.hpp"
 
 namespace tubule::axisym {
 namespace {
+
+// Numbers n > 0 of the initial modes, each once.
+std::vector<int> tracked_modes(const Problem& c) {
+    std::set<int> waves;
+    if (const Tube* tube = std::get_if<Tube>(&c.shape))
+        for (const TubeMode& mode : tube->modes)
+            if (mode.n > 0) waves.insert(mode.n);
+    return {waves.begin(), waves.end()};
+}
+
+double lambda(const CurveRow& r) {
+    const int at = r.motion.layout().lambda;
+    return at < 0 ? 0 : r.y[at];
+}
 
 // What a run needs to resume, by name.
 template <class Fields, class State>
@@ -57,24 +66,58 @@ Sample sample(const CurveMotion& motion, const CurveRestart& state, double s) {
     return out;
 }
 
-struct MakeMeridian {
-    const Problem& c;
-    template <class Exact>
-    Curve operator()(const Exact& shape) const {
-        return meridian(shape);
-    }
-    Curve operator()(const ProfileFile& file) const { return start_profile(c, file).curve; }
-    Curve operator()(const MeshFile&) const { throw complaint(c, "shape.kind", "is a mesh, not a profile"); }
-    Curve operator()(const ResultFrame&) const {
-        try {
-            return meridian(disturbed_curve(c, start_frame(c).record));
-        } catch (const std::invalid_argument& error) {
-            throw complaint(c, "shape.path", fmt::format("cannot be used: {}", error.what()));
-        }
-    }
-};
-
 }  // namespace
+
+SeriesTable<CurveRow> curve_series(const Problem& c) {
+    const std::vector<int> modes = tracked_modes(c);
+    std::vector<std::string> waves;
+    for (const int n : modes) waves.push_back(std::to_string(n));
+    SeriesTable<CurveRow> table;
+    table.add({{"time", [](const CurveRow& r) { return r.time; }},
+               {"step_size", [](const CurveRow& r) { return r.integrator.step_size(); }},
+               {"order", [](const CurveRow& r) { return static_cast<double>(r.integrator.order()); }},
+               {"newton_iterations", [](const CurveRow& r) { return static_cast<double>(r.newton_iterations); }},
+               {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
+    table.add_family("energy_<kl>", term_names(c.energy),
+                     [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
+    if (c.energy.kg > 0) table.add({{"energy_kg", [](const CurveRow& r) { return r.now.o.energy_kg; }}});
+    if (c.energy.alpha)
+        table.add({{"energy_alpha", [](const CurveRow& r) { return r.now.o.energy_alpha; }},
+                   {"M", [](const CurveRow& r) { return r.now.o.M; }}});
+    const MotionLaw law = c.law;
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_energy", [](const CurveRow& r) { return r.now.o.potential.energy; }}});
+    table.add({{"free_energy", [](const CurveRow& r) { return r.now.free_energy; }}});
+    if (law.loads_change() || law.supplies_kinetic_energy())
+        table.add({{"work", [](const CurveRow& r) { return r.work; }}});
+    table.add({{"dissipation", [](const CurveRow& r) { return r.now.balance.dissipation; }},
+               {"identity_defect", [](const CurveRow& r) { return r.identity_defect; }},
+               {"area", [](const CurveRow& r) { return r.now.o.area; }},
+               {"volume", [](const CurveRow& r) { return r.now.o.volume; }},
+               {"r_min", [](const CurveRow& r) { return std::isfinite(r.now.neck.radius) ? r.now.neck.radius : 0; }},
+               {"r_max", [](const CurveRow& r) { return r.now.o.r_max; }}});
+    table.add_family("mode_<n>", waves, [modes](const CurveRow& r, std::size_t wave) {
+        return mode_amplitude(r.motion.space(), r.y, modes[wave]);
+    });
+    if (law.inextensible)
+        table.add({{"kinetic_energy", [](const CurveRow& r) { return r.now.balance.kinetic; }},
+                   {"speed", [](const CurveRow& r) { return r.now.balance.speed; }},
+                   {"momentum_z", [](const CurveRow& r) { return r.now.balance.momentum_z; }},
+                   {"angular_momentum_z", [](const CurveRow& r) { return r.now.balance.angular_z; }},
+                   {"lambda", lambda}});
+    table.add({{"tension", [](const CurveRow& r) { return r.now.balance.loads.tension; }},
+               {"pressure", [](const CurveRow& r) { return r.now.balance.loads.pressure; }}});
+    if (may_have_period(c.shape) || law.beads || has_two_rings(c.shape))
+        table.add({{"force", [](const CurveRow& r) { return r.now.balance.loads.force; }}});
+    if (!c.energy.potentials.empty())
+        table.add({{"potential_force", [](const CurveRow& r) { return r.now.o.potential.force; }}});
+    if (law.beads) table.add({{"bead_distance", [](const CurveRow& r) { return r.now.length; }}});
+    if (law.free_period) table.add({{"height", [](const CurveRow& r) { return r.now.length; }}});
+    table.add({{"energy_error", [](const CurveRow& r) { return r.energy_error; }},
+               {"elements", [](const CurveRow& r) { return static_cast<double>(r.elements); }},
+               {"wall_seconds", [](const CurveRow& r) { return r.wall_seconds; }}});
+    return table;
+}
 
 Record curve_record(double time, const CurveMotion& motion, const CurveRestart& state, double energy) {
     const CurveSpace& space = motion.space();
@@ -114,21 +157,6 @@ CurveRestart curve_restart(const Record& record) {
     restart_fields(RecordReader(record, RecordKind::curve), s);
     s.trace.cut_after(record.time);
     return s;
-}
-
-std::optional<PerturbedCurve> initial_velocity(const Problem& c) {
-    if (c.velocity.initial != InitialVelocity::result) return std::nullopt;
-    const Record frame = start_frame(c).record;
-    PerturbedCurve out = frame_curve(frame);
-    out.velocity = frame_velocity(frame, out);
-    if (!out.velocity)
-        throw complaint(c, "velocity.initial",
-                        "must not be \"result\": the frame of shape.path is no profile with a velocity");
-    return out;
-}
-
-Curve initial_curve(const Problem& c) {
-    return std::visit(MakeMeridian{c}, c.shape);
 }
 
 }  // namespace tubule::axisym

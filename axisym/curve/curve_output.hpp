@@ -1,14 +1,30 @@
-// Profile curves as records of the result file, and as initial shapes from it.
+// What a run of a curve writes: its rows, a row each step, and the curve as a record of the result file, and back.
 #pragma once
 
-#include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_settings.hpp"
-#include "axisym/splines/arc_length.hpp"
+#include "axisym/curve/curve_snapshot.hpp"
+#include "axisym/integration/time_integrator.hpp"
 #include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/run/energy_trace.hpp"
+#include "common/series/table.hpp"
 
 namespace tubule::axisym {
+
+// Input of a row.
+struct CurveRow {
+    double time;
+    const Snapshot& now;
+    const double* y;
+    const CurveMotion& motion;
+    const TimeIntegrator& integrator;
+    long newton_iterations;
+    double identity_defect, work, energy_error;
+    int elements;
+    double wall_seconds;
+};
+
+SeriesTable<CurveRow> curve_series(const Problem& c);
 
 // What a run of a curve needs to resume.
 struct CurveRestart {
@@ -32,12 +48,5 @@ Record state_record(double time, const CurveRestart& state);
 
 // Throws as RecordReader.
 CurveRestart curve_restart(const Record& record);
-
-// The initial shape of a case. Throws CaseError for a result without a frame of this tier.
-Curve initial_curve(const Problem& c);
-
-// The curve of the frame that a case begins with, with its velocity, where the case asks for that. Throws CaseError
-// where the frame has none.
-std::optional<PerturbedCurve> initial_velocity(const Problem& c);
 
 }  // namespace tubule::axisym
