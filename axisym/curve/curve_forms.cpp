@@ -413,7 +413,7 @@ FormulaDomain::Margin CurveForms::domain(const Eigen::VectorXd& x) const {
     return of_place.value < of_density.value ? of_place : of_density;
 }
 
-CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* defect) const {
+CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<double>* mesh_loss) const {
     const SplineSpace& splines = space_.splines();
     const VaryingH0 H0 = with_H0(x.data(), [](const VaryingH0& at) { return at; });
     CurveObservation o;
@@ -461,12 +461,12 @@ CurveObservation CurveForms::observe(const Eigen::VectorXd& x, std::vector<doubl
     std::vector<double> of_gradients;
     if (bending_.kg != 0) o.energy += o.energy_kg = bending_.kg * gradients_->value(x.data(), &of_gradients);
     o.domain = domain(x);
-    if (defect) *defect = spline_defect(x, stiffness, of_gradients);
+    if (mesh_loss) *mesh_loss = loss_to_mesh(x, stiffness, of_gradients);
     return o;
 }
 
-std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness,
-                                              const std::vector<double>& of_gradients) const {
+std::vector<double> CurveForms::loss_to_mesh(const Eigen::VectorXd& x, const std::vector<double>& stiffness,
+                                             const std::vector<double>& of_gradients) const {
     const SplineSpace& splines = space_.splines();
     const int n = splines.elements(), p = splines.degree();
     const auto& breaks = splines.breaks();
@@ -481,14 +481,14 @@ std::vector<double> CurveForms::spline_defect(const Eigen::VectorXd& x, const st
     }
     if (splines.cell().open_start) jump[0] = jump[1];
     if (splines.cell().open_end) jump[n] = jump[n - 1];
-    std::vector<double> defect(n);
+    std::vector<double> mesh_loss(n);
     for (int e = 0; e < n; ++e) {
         double loss = images_ * splines.bernoulli_norm() * std::pow(size(e), 2 * (p - 1)) * stiffness[e];
         if (!of_gradients.empty())
             loss += splines.bernoulli_norm_of_third() * std::pow(size(e), 2 * (p - 2)) * bending_.kg * of_gradients[e];
-        defect[e] = loss / 4 * (jump[e] * jump[e] + jump[e + 1] * jump[e + 1]);
+        mesh_loss[e] = loss / 4 * (jump[e] * jump[e] + jump[e + 1] * jump[e + 1]);
     }
-    return defect;
+    return mesh_loss;
 }
 
 double CurveForms::reference_energy(const Eigen::VectorXd& x) const {

@@ -92,9 +92,9 @@ public:
 
     // r > 0, |X'| > 0 and the energy defined at all quadrature points, none of them behind a wall.
     bool admissible(const Eigen::VectorXd& x) const;
-    // `defect`, if given, receives for each element the energy lost to the spline there: half the second variation of
-    // the best approximation error of the normal displacement, from the jumps of the highest derivatives.
-    CurveObservation observe(const Eigen::VectorXd& x, std::vector<double>* defect = nullptr) const;
+    // `mesh_loss`, if given, receives for each element the energy lost to the spline there: half the second variation
+    // of the best approximation error of the normal displacement, from the jumps of the highest derivatives.
+    CurveObservation observe(const Eigen::VectorXd& x, std::vector<double>* mesh_loss = nullptr) const;
     // E_ref, the scale that the required accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;
 
@@ -111,8 +111,8 @@ private:
     FormulaDomain::Margin domain(const Eigen::VectorXd& x) const;
     template <class Add>
     void add_rise_hessian(const Weights& weights, const double* x, const Add& add) const;
-    std::vector<double> spline_defect(const Eigen::VectorXd& x, const std::vector<double>& stiffness,
-                                      const std::vector<double>& of_gradients) const;
+    std::vector<double> loss_to_mesh(const Eigen::VectorXd& x, const std::vector<double>& stiffness,
+                                     const std::vector<double>& of_gradients) const;
 
     const CurveSpace& space_;
     Bending bending_;

@@ -91,7 +91,7 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
     if (law.loads_change() || law.supplies_kinetic_energy())
         table.add({{"work", [](const CurveRow& r) { return r.work; }}});
     table.add({{"dissipation", [](const CurveRow& r) { return r.now.balance.dissipation; }},
-               {"identity_defect", [](const CurveRow& r) { return r.identity_defect; }},
+               {"identity_defect", [](const CurveRow& r) { return r.imbalance; }},
                {"area", [](const CurveRow& r) { return r.now.o.area; }},
                {"volume", [](const CurveRow& r) { return r.now.o.volume; }},
                {"r_min", [](const CurveRow& r) { return std::isfinite(r.now.neck.radius) ? r.now.neck.radius : 0; }},

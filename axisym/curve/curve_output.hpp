@@ -19,7 +19,7 @@ struct CurveRow {
     const CurveMotion& motion;
     const TimeIntegrator& integrator;
     long newton_iterations;
-    double identity_defect, work, energy_error;
+    double imbalance, work, energy_error;
     int elements;
     double wall_seconds;
 };

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int steps_between_looks = 10;
 // Measured choices: docs/decisions/curves.md, "How large is the error of a curve in motion?".
-constexpr double error_per_defect = 0.5;           // of the energy balance
+constexpr double error_per_imbalance = 0.5;        // of the energy balance
 constexpr double least_error = 0.02;               // of what is asked for: no estimate is trusted below
 constexpr double start_steps = 40;                 // over which steps grow where the integrator begins
 constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
@@ -54,9 +54,9 @@ struct CurveSimulation::View : StateView {
         : run(r), t(time), dissipated(lost), work(done), y(unknowns), rate(rates), s(measured) {}
 
     std::vector<double> row(double wall_seconds) const override {
-        const double defect = s.total() - run.past_.total_start + dissipated - work;
+        const double imbalance = s.total() - run.past_.total_start + dissipated - work;
         return run.setup_.series.values({t, s, y.data(), *run.setup_.motion, *run.integrator_,
-                                         run.counters().newton_iterations, defect, work, run.error_now_,
+                                         run.counters().newton_iterations, imbalance, work, run.error_now_,
                                          run.summary.elements, wall_seconds});
     }
 
@@ -315,7 +315,7 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
     if (!coarser_) return;
     const bool given = setup_.c.profile_resolution_given();
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
-                 unbalanced = t > 0 ? error_per_defect * std::abs(defect(t, s)) : 0;
+                 unbalanced = t > 0 ? error_per_imbalance * std::abs(imbalance(t, s)) : 0;
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
     const std::optional<double> difference = coarser_->trace().difference(t, s.free_energy);
     error_now_ = std::max(difference ? share(t) * *difference : error_now_, least);

@@ -52,10 +52,10 @@ public:
 private:
     struct View;
     struct Past {
-        double total_start = 0, dissipated = 0, work = 0;  // before this flow began
+        double total_start = 0, dissipated = 0, work = 0;  // before this integrator began
         double least = 0;                                  // over all steps, of what never rises: total less work
         IntegratorCounters counters;
-        Loads rates;              // of change, of the loads of this flow
+        Loads rates;              // of change, of the loads of this integrator
         double extends = 0;       // rate of the distance of beads that is held
         Eigen::VectorXd y, rate;  // of the last good step
         double time = 0;
@@ -70,7 +70,9 @@ private:
     void look_at_mesh();
     void compare(double t, const Snapshot& s);
     double share(double t) const;
-    double defect(double t, const Snapshot& s) const { return s.total() - past_.total_start + dissipated(t) - work(t); }
+    double imbalance(double t, const Snapshot& s) const {
+        return s.total() - past_.total_start + dissipated(t) - work(t);
+    }
     bool holds_all() const;
     double power_supplied(const Snapshot& s) const;
     void keep_good();

@@ -27,15 +27,15 @@ void limit_growth(ElementDensity& density, int elements) {
 
 }  // namespace
 
-void MeshNeed::add(const SplineSpace& space, const std::vector<double>& defect) {
-    lost = std::max(lost, std::accumulate(defect.begin(), defect.end(), 0.0));
+void MeshNeed::add(const SplineSpace& space, const std::vector<double>& mesh_loss) {
+    lost = std::max(lost, std::accumulate(mesh_loss.begin(), mesh_loss.end(), 0.0));
     wanted.resize(parts, 0);
     const std::vector<double>& breaks = space.breaks();
     const double begin = breaks.front(), width = (breaks.back() - begin) / parts;
     for (int i = 0, e = 0; i < parts; ++i) {
         while (e + 1 < space.elements() && breaks[e + 1] <= begin + (i + 0.5) * width) ++e;
         const double size = breaks[e + 1] - breaks[e];
-        wanted[i] = std::max(wanted[i], std::pow(defect[e] / size, 0.5 / (space.degree() - 1)) / size);
+        wanted[i] = std::max(wanted[i], std::pow(mesh_loss[e] / size, 0.5 / (space.degree() - 1)) / size);
     }
 }
 

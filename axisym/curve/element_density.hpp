@@ -12,8 +12,8 @@ using ElementDensity = std::vector<double>;
 
 // The mesh that the states of a run required.
 struct MeshNeed {
-    // `defect`: the energy lost in each element of the space, which falls with the power 2 (degree - 1) of its size.
-    void add(const SplineSpace& space, const std::vector<double>& defect);
+    // `mesh_loss`: the energy lost in each element of the space, which falls with the power 2 (degree - 1) of its size.
+    void add(const SplineSpace& space, const std::vector<double>& mesh_loss);
     // Half of the elements stay equal. Empty if nothing was added, or nothing is lost.
     ElementDensity density() const;
 

@@ -1,4 +1,5 @@
-// What CurveMotion adds where a patch ends in rings: the forces that hold them, and membrane that flows through open ones.
+// What CurveMotion adds where a patch ends in rings: the forces that hold them, and membrane that flows through open
+// ones.
 #include "axisym/curve/curve_motion.hpp"
 
 namespace tubule::axisym {

@@ -53,11 +53,11 @@ public:
         e.sigma = place.w[n], e.lambda = place.w[n + 1], e.mu = place.w[system_->mu()];
         if (problem.beads) e.beads = place.w.segment<4>(system_->beads());
         e.rim = place.w.segment(system_->rim(), condition_count(problem.rings));
-        std::vector<double> defect;
-        e.observed = system_->forms().observe(e.x, &defect);
+        std::vector<double> mesh_loss;
+        e.observed = system_->forms().observe(e.x, &mesh_loss);
         e.length = system_->length(place.u());
         e.reference_energy = system_->forms().reference_energy(e.x);
-        e.estimated_error = lost(defect) / e.reference_energy;
+        e.estimated_error = lost(mesh_loss) / e.reference_energy;
         e.stop = Stop::finished;
         if (kind != PointKind::regular) return e;
         EquilibriumSettings settings = settings_;
@@ -72,13 +72,13 @@ public:
     // Other elements when these are too coarse.
     Renewal renew(Place& place) {
         const Eigen::VectorXd x = curve(place.w);
-        std::vector<double> defect;
-        system_->forms().observe(x, &defect);
+        std::vector<double> mesh_loss;
+        system_->forms().observe(x, &mesh_loss);
         const double allowed = std::max(settings_.accuracy, 1e-11) * system_->forms().reference_energy(x);
-        if (lost(defect) <= allowed) return Renewal::none;
+        if (lost(mesh_loss) <= allowed) return Renewal::none;
         const SplineSpace& splines = system_->space().splines();
-        std::vector<double> breaks =
-            adapted_breaks(splines, defect, 0.02 * allowed, 8 / system_->space().images(), settings_.max_elements + 1);
+        std::vector<double> breaks = adapted_breaks(splines, mesh_loss, 0.02 * allowed, 8 / system_->space().images(),
+                                                    settings_.max_elements + 1);
         if (static_cast<int>(breaks.size()) - 1 > settings_.max_elements) return Renewal::impossible;
         const auto finer =
             std::make_shared<CurveSpace>(system_->space().topology(), breaks, splines.degree(), splines.smoothness(),
@@ -110,9 +110,9 @@ private:
     }
 
     // The error of the mesh, estimated from its jumps, which show a fifth of it on meshes that are just fine enough.
-    static double lost(const std::vector<double>& defect) {
+    static double lost(const std::vector<double>& mesh_loss) {
         double sum = 0;
-        for (double d : defect) sum += d;
+        for (double d : mesh_loss) sum += d;
         return 5 * sum;
     }
 

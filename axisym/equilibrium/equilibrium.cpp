@@ -283,12 +283,12 @@ private:
     int elements_ = 0;
 };
 
-// A mesh for the state on the present one. The jumps that the defect is read from underestimate the error on a coarse
-// mesh: where a shape was `found`, take at least half as many elements again.
-std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& defect, double allowed,
+// A mesh for the state on the present one. The jumps that the mesh loss is read from underestimate the error on a
+// coarse mesh: where a shape was `found`, take at least half as many elements again.
+std::vector<double> next_breaks(const CurveSpace& space, const std::vector<double>& mesh_loss, double allowed,
                                 int max_elements, bool found) {
     const int elements = space.splines().elements();
-    const std::vector<double> breaks = adapted_breaks(space.splines(), defect, 0.1 * allowed,
+    const std::vector<double> breaks = adapted_breaks(space.splines(), mesh_loss, 0.1 * allowed,
                                                       std::max(coarsest, elements / 4) / space.images(), max_elements);
     const int wanted = std::max(static_cast<int>(breaks.size()) - 1, elements + (found ? (elements + 1) / 2 : 0));
     return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
@@ -429,9 +429,9 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const Eigen::VectorXd x = u.head(n);
         if (system.forms().admissible(x)) last = system.forms().observe(x);
         if (!system.forms().admissible(x) || (!found && !settings.descend)) break;
-        std::vector<double> defect;
+        std::vector<double> mesh_loss;
         out.x = x, out.sigma = u[system.sigma()], out.lambda = u[system.lambda()], out.mu = u[system.mu()];
-        out.observed = system.forms().observe(x, &defect);
+        out.observed = system.forms().observe(x, &mesh_loss);
         out.length = system.length(u);
         if (problem.beads) out.beads = u.segment<4>(system.beads());
         out.rim = u.tail(condition_count(problem.rings));
@@ -440,16 +440,17 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         const double error = found ? compare(free_energy(problem, out.observed, out.length), elements, power)
                                    : std::numeric_limits<double>::infinity();
         // The spline's loss, and what the shape gives up for the gauge, can be seen on one mesh too.
-        const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
+        const double lost = std::accumulate(mesh_loss.begin(), mesh_loss.end(), 0.0);
         out.estimated_error = std::max({error, lost, 3 * gauge * out.observed.gauge}) / out.reference_energy;
         if (auto ended = verdict(problem, system, u, found, settings, out))
             return end(ended->first, std::move(ended->second));
-        const auto finer = space_like(*space,
-                                      breaks_for(problem, space->topology(),
-                                                 next_breaks(*space, defect, settings.accuracy * out.reference_energy,
-                                                             settings.max_elements, found),
-                                                 out.observed.length),
-                                      settings.degree);
+        const auto finer = space_like(
+            *space,
+            breaks_for(
+                problem, space->topology(),
+                next_breaks(*space, mesh_loss, settings.accuracy * out.reference_energy, settings.max_elements, found),
+                out.observed.length),
+            settings.degree);
         Eigen::VectorXd next(finer->size() + system.numbers());
         next << finer->prolong(*space, x), u.tail(system.numbers());
         space = finer, u = next;

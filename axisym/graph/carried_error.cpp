@@ -76,13 +76,13 @@ void ErrorTransport::add_residual(double weight) {
     sampled_ += weight;
 }
 
-void ErrorTransport::add_step(const TimeIntegrator& flow, double from, bool rosenbrock) {
-    const double h = flow.time() - from;
+void ErrorTransport::add_step(const TimeIntegrator& integrator, double from, bool rosenbrock) {
+    const double h = integrator.time() - from;
     Level& c = on_coarse_;
-    const Eigen::Map<const Eigen::VectorXd> x(flow.x(), c.state.size()), v(flow.v(), c.rate.size());
+    const Eigen::Map<const Eigen::VectorXd> x(integrator.x(), c.state.size()), v(integrator.v(), c.rate.size());
     if (rosenbrock) {
         for (std::size_t q = 0; q < path_points.size(); ++q) {
-            flow.interpolate(from + path_points[q] * h, c.middle.data(), c.slope.data());
+            integrator.interpolate(from + path_points[q] * h, c.middle.data(), c.slope.data());
             add_residual(path_weights[q] * h);
         }
     } else {

@@ -41,7 +41,7 @@ public:
     // polynomial of its method and Gauss' rule. (The error estimate of the method cannot replace it: it is that of a
     // method of lower order.) A short one takes the cubic through states and rates at its ends and Simpson's rule, as
     // at the ends only the residual of space is left.
-    void add_step(const TimeIntegrator& flow, double from, bool rosenbrock);
+    void add_step(const TimeIntegrator& integrator, double from, bool rosenbrock);
     // Brings the errors to the time of the last step.
     void advance();
     // dF/dx of the run at x where the last advance() has it, else null.

@@ -80,8 +80,8 @@ Forms::Forms(const SplineSpace& space, const Bending& bending, const Loads& load
     });
     pattern_ = std::move(pattern), slots_ = std::move(slots);
     for (int e = 0; e < space.elements(); ++e)
-        defect_scale_.push_back(images_ * space.bernoulli_norm() / 4 *
-                                std::pow(space.breaks()[e + 1] - space.breaks()[e], 2 * (degree - 1)));
+        loss_scale_.push_back(images_ * space.bernoulli_norm() / 4 *
+                              std::pow(space.breaks()[e + 1] - space.breaks()[e], 2 * (degree - 1)));
 }
 
 template <int P>
@@ -341,21 +341,21 @@ template <int P>
     return by_added(bending_, kernel);
 }
 
-Observation Forms::observe(const double* x, const double* v, std::vector<double>* defect) const {
+Observation Forms::observe(const double* x, const double* v, std::vector<double>* mesh_loss) const {
     double* stiffness = nullptr;
-    if (defect) {
-        defect->resize(space_.elements());
-        stiffness = defect->data();
+    if (mesh_loss) {
+        mesh_loss->resize(space_.elements());
+        stiffness = mesh_loss->data();
     }
     Observation o = for_degree(space_.degree(), [&](auto P) { return observe_kernel<P()>(x, v, stiffness); });
     std::vector<double> of_gradients;
-    if (gradients_) o.energy += o.energy_kg = bending_.kg * gradients_->value(x, defect ? &of_gradients : nullptr);
+    if (gradients_) o.energy += o.energy_kg = bending_.kg * gradients_->value(x, mesh_loss ? &of_gradients : nullptr);
     o.free_energy = o.energy + loads_.energy(o.area, o.volume, 0);
     o.domain = domain(x);
-    if (!defect) return o;
+    if (!mesh_loss) return o;
     const std::vector<double> jump = space_.top_jumps(x);
     for (int e = 0; e < space_.elements(); ++e) {
-        double& loss = (*defect)[e] *= defect_scale_[e];
+        double& loss = (*mesh_loss)[e] *= loss_scale_[e];
         if (gradients_)
             loss += bending_.kg * space_.bernoulli_norm_of_third() / 4 * of_gradients[e] *
                     std::pow(space_.breaks()[e + 1] - space_.breaks()[e], 2 * (space_.degree() - 2));

@@ -61,10 +61,10 @@ public:
     // The rate x_t of the flow at x. Throws SolveError when the mass matrix is singular.
     Eigen::VectorXd rate(const Eigen::VectorXd& x) const;
 
-    // `defect`, if given, receives for each element the energy lost to the spline there: half the second
+    // `mesh_loss`, if given, receives for each element the energy lost to the spline there: half the second
     // variation of the best approximation error, from the jumps of the highest derivative
     // (docs/decisions/graphs.md), over the whole period.
-    Observation observe(const double* x, const double* v, std::vector<double>* defect = nullptr) const;
+    Observation observe(const double* x, const double* v, std::vector<double>* mesh_loss = nullptr) const;
     // The axial force that keeps the period, theory.md (3.19): dF/dL while the profile is stretched along z.
     double axial_force(const Eigen::VectorXd& x) const;
     // E_ref, the scale that the required accuracy refers to: theory.md (11.1).
@@ -94,8 +94,8 @@ private:
     std::optional<GradientForms<SplineSpace>> gradients_;  // where kg > 0
     double images_;                                        // cells in the whole period
     Eigen::SparseMatrix<double> pattern_;
-    std::vector<double> defect_scale_;  // of each element, see observe()
-    std::vector<int> slots_;            // place in pattern_ of the local matrix entries of each element
+    std::vector<double> loss_scale_;  // of each element, see observe()
+    std::vector<int> slots_;          // place in pattern_ of the local matrix entries of each element
 };
 
 }  // namespace tubule::axisym

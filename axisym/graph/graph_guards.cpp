@@ -18,42 +18,42 @@ constexpr double symbol_lost = 1e-3;       // of the initial one; on the way to 
 std::span<const GraphGuard> graph_guards() {
     static const GraphGuard list[]{
         {[](const Observation& o, const GraphLimits& limits) { return o.r_min - limits.r_min; },
-         [](const Observation& o, const GraphMesh& stage, const double*, double time) {
+         [](const Observation& o, const GraphMesh& mesh, const double*, double time) {
              return StopReport{
                  Stop::pinch_off, time,
-                 fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", o.r_min, stage.place(o.z_min)),
+                 fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", o.r_min, mesh.place(o.z_min)),
                  "lower accuracy.r_min to follow the neck further"};
          }},
         {[](const Observation& o, const GraphLimits&) { return overhang_steepness - o.steepness; }, overhang},
         {[](const Observation& o, const GraphLimits& limits) { return o.symbol - limits.least_symbol; },
-         [](const Observation& o, const GraphMesh& stage, const double*, double time) {
+         [](const Observation& o, const GraphMesh& mesh, const double*, double time) {
              return StopReport{
                  Stop::ill_posed, time,
                  fmt::format("the flow lost its well-posedness at z = {:.6g}: f_HH + 2 f_HK x + f_KK x^2 fell to "
                              "{:.3g} at x = kappa_theta",
-                             stage.place(o.z_symbol), o.symbol),
+                             mesh.place(o.z_symbol), o.symbol),
                  "refinement does not help: the energy does not resist short waves there"};
          }},
         {[](const Observation& o, const GraphLimits&) { return 1 - o.coarse; },
-         [](const Observation& o, const GraphMesh& stage, const double*, double time) {
+         [](const Observation& o, const GraphMesh& mesh, const double*, double time) {
              return StopReport{
                  Stop::resolution_lost, time,
-                 unresolved_waves(fmt::format("an element near z = {:.6g} is", stage.place(o.z_coarse)), o.coarse),
+                 unresolved_waves(fmt::format("an element near z = {:.6g} is", mesh.place(o.z_coarse)), o.coarse),
                  "use a tighter accuracy.energy, or set discretisation.elements; a larger energy.kg needs fewer "
                  "elements"};
          }},
         {[](const Observation& o, const GraphLimits&) { return o.domain.is_small() ? -1 : 1.0; },
-         [](const Observation& o, const GraphMesh& stage, const double*, double time) {
-             return undefined_energy(o.domain, time, fmt::format("z = {:.6g}", stage.place(o.domain.place)));
+         [](const Observation& o, const GraphMesh& mesh, const double*, double time) {
+             return undefined_energy(o.domain, time, fmt::format("z = {:.6g}", mesh.place(o.domain.place)));
          }}};
     return list;
 }
 
-StopReport overhang(const Observation& o, const GraphMesh& stage, const double* x, double time) {
-    const double steepness = std::abs(stage.space.evaluate(x, stage.space.element_at(o.z_steep), o.z_steep)[1]);
+StopReport overhang(const Observation& o, const GraphMesh& mesh, const double* x, double time) {
+    const double steepness = std::abs(mesh.space.evaluate(x, mesh.space.element_at(o.z_steep), o.z_steep)[1]);
     return {Stop::overhang, time,
             fmt::format("the profile r(z) turned vertical at z = {:.6g} (|r'| = {:.3g} away from a neck)",
-                        stage.place(o.z_steep), steepness),
+                        mesh.place(o.z_steep), steepness),
             "the shape is about to overhang, which a graph r(z) cannot follow; the results until here are valid"};
 }
 

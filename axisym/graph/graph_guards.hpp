@@ -17,11 +17,11 @@ struct GraphLimits {
 // A value that is positive while all is well, and the report for when it no longer is.
 struct GraphGuard {
     double (*value)(const Observation& o, const GraphLimits& limits);
-    StopReport (*report)(const Observation& o, const GraphMesh& stage, const double* x, double time);
+    StopReport (*report)(const Observation& o, const GraphMesh& mesh, const double* x, double time);
 };
 std::span<const GraphGuard> graph_guards();
 
-StopReport overhang(const Observation& o, const GraphMesh& stage, const double* x, double time);
+StopReport overhang(const Observation& o, const GraphMesh& mesh, const double* x, double time);
 
 // Whether the profile is so steep that a failure there is due to an overhang.
 bool is_about_to_overhang(const Observation& o);

@@ -23,14 +23,14 @@ namespace {
 double time_tolerance_for(double asked, bool rosenbrock) {
     return std::max(!rosenbrock ? 0.35 * asked : 3.5e-5 * std::pow(asked / 1e-4, 0.68), 1e-13);
 }
-constexpr double defect_per_accuracy = 1.0 / 12;  // defect at which to remesh / (asked accuracy * E_ref)
+constexpr double loss_per_accuracy = 1.0 / 12;  // mesh loss at which to remesh / (asked accuracy * E_ref)
 
 }  // namespace
 
 GraphSettings first_graph_settings(const Problem& c, bool rosenbrock) {
     const double asked = c.accuracy.energy;
     return {c.discretisation.time_tolerance.value_or(time_tolerance_for(asked, rosenbrock)),
-            defect_per_accuracy * asked,
+            loss_per_accuracy * asked,
             !c.discretisation.time_tolerance,
             !c.discretisation.elements,
             true,
@@ -47,7 +47,7 @@ GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& erro
     const double of_space = std::abs(error.spatial), of_time = std::abs(error.total - error.spatial);
     if (s.free_time && of_time > 0.3 * allowed)
         s.time_tolerance = std::max(s.time_tolerance * shrink(0.35, of_time), 1e-14);
-    if (s.free_mesh && of_space > 0.3 * allowed) s.defect *= shrink(0.15, of_space);
+    if (s.free_mesh && of_space > 0.3 * allowed) s.mesh_loss *= shrink(0.15, of_space);
     return s;
 }
 
@@ -84,9 +84,9 @@ Cell cell_of(const Tube& tube, bool symmetry) {
     return {0, period, false, waves};
 }
 
-std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span) {
+std::vector<double> foreseen_mesh_loss(const Forms& forms, const Eigen::VectorXd& x, double span) {
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size()), force = forms.gradient(x);
-    std::vector<double> largest, defect;
+    std::vector<double> largest, mesh_loss;
     forms.observe(x.data(), rest.data(), &largest);
     Eigen::SparseMatrix<double> matrix = forms.pattern();
     BandLu lu(matrix);
@@ -98,9 +98,9 @@ std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x
             continue;  // no step of this length; a shorter one may exist
         }
         const Eigen::VectorXd ahead = x - lu.solved(force);
-        const Observation o = forms.observe(ahead.data(), rest.data(), &defect);
+        const Observation o = forms.observe(ahead.data(), rest.data(), &mesh_loss);
         if (!(o.r_min > 0 && o.symbol > 0)) continue;  // the flow does not lead there
-        for (std::size_t e = 0; e < defect.size(); ++e) largest[e] = std::max(largest[e], defect[e]);
+        for (std::size_t e = 0; e < mesh_loss.size(); ++e) largest[e] = std::max(largest[e], mesh_loss[e]);
     }
     return largest;
 }
@@ -119,8 +119,8 @@ struct Density {
     }
 };
 
-// The defect of an element of size h is c h^(2p-1). Equal shares mean h ~ c^(-1/(2p-1)).
-Density wanted_density(const SplineSpace& space, const std::vector<double>& defect, double target, int fewest) {
+// The mesh loss of an element of size h is c h^(2p-1). Equal shares mean h ~ c^(-1/(2p-1)).
+Density wanted_density(const SplineSpace& space, const std::vector<double>& mesh_loss, double target, int fewest) {
     constexpr double growth = 0.35;  // of the element size per distance
     const int exponent = 2 * space.degree() - 1;
     Density d;
@@ -128,7 +128,7 @@ Density wanted_density(const SplineSpace& space, const std::vector<double>& defe
         const double z = space.breaks()[e], h = space.breaks()[e + 1] - z;
         for (int i = 0; i < Density::parts; ++i) {
             d.edges.push_back(z + h * i / Density::parts);
-            d.value.push_back(std::pow(std::max(defect[e], 0.0) + 1e-300, 1.0 / exponent) / h);
+            d.value.push_back(std::pow(std::max(mesh_loss[e], 0.0) + 1e-300, 1.0 / exponent) / h);
         }
     }
     d.edges.push_back(space.breaks().back());
@@ -154,9 +154,9 @@ Density wanted_density(const SplineSpace& space, const std::vector<double>& defe
 
 }  // namespace
 
-std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& mesh_loss, double target,
                                    int fewest, int most) {
-    const Density d = wanted_density(space, defect, target, fewest);
+    const Density d = wanted_density(space, mesh_loss, target, fewest);
     std::vector<double> count{0};
     for (std::size_t i = 0; i < d.value.size(); ++i)
         count.push_back(count.back() + d.value[i] * d.width(static_cast<int>(i)));
@@ -164,9 +164,9 @@ std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<d
     return equal_shares(d.edges, count, elements);
 }
 
-std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& mesh_loss, double target,
                                    int most) {
-    const Density d = wanted_density(space, defect, target, 1);
+    const Density d = wanted_density(space, mesh_loss, target, 1);
     std::vector<double> breaks{space.cell().z0};
     for (int e = 0; e < space.elements(); ++e) {
         double wanted = 0;
@@ -183,7 +183,7 @@ std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<d
 namespace {
 
 // Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
-constexpr double start_margin = 1.0 / 4;  // initial defect / defect at which to remesh
+constexpr double start_margin = 1.0 / 4;  // initial mesh loss / that at which to remesh
 constexpr int fewest_elements = 3;
 constexpr double coarsest_at_first = 0.5;  // of Observation::coarse, at which a run ends when it is 1
 
@@ -215,8 +215,8 @@ double GraphMesh::place(double z) const {
     return z - std::floor(z / length) * length;
 }
 
-Observation GraphMesh::look(const double* x, const double* v, std::vector<double>* defect) const {
-    Observation o = forms.observe(x, v, defect);
+Observation GraphMesh::look(const double* x, const double* v, std::vector<double>* mesh_loss) const {
+    Observation o = forms.observe(x, v, mesh_loss);
     for (auto [z, r] : {std::pair{&o.z_min, &o.r_min}, std::pair{&o.z_max, &o.r_max}}) {
         *z = space.extremum_near(x, *z);
         *r = space.evaluate(x, space.element_at(*z), *z)[0];
@@ -239,14 +239,15 @@ std::vector<double> initial_breaks(const Problem& c, const GraphSettings& settin
         const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
         const Observation o = forms.observe(x.data(), rest.data());
         require_defined(c, o.domain, fmt::format("z = {:.6g}", o.domain.place));
-        const double allowed = settings.defect * reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
+        const double allowed =
+            settings.mesh_loss * reference_energy(c, forms.free_energy(x), forms.reference_energy(x));
         if (!settings.free_mesh || pass == 8 || space.elements() >= most_graph_elements) return breaks;
-        const std::vector<double> defect = foreseen_defect(forms, x, c.time.end);
-        const double lost = std::accumulate(defect.begin(), defect.end(), 0.0);
+        const std::vector<double> mesh_loss = foreseen_mesh_loss(forms, x, c.time.end);
+        const double lost = std::accumulate(mesh_loss.begin(), mesh_loss.end(), 0.0);
         if (lost < allowed * start_margin && o.coarse <= coarsest_at_first) return breaks;
         const double for_waves = std::min(o.coarse / coarsest_at_first * space.elements(), most_graph_elements + 1.0);
         std::vector<double> next =
-            adapted_breaks(space, defect, allowed * start_margin / 2,
+            adapted_breaks(space, mesh_loss, allowed * start_margin / 2,
                            std::max(fewest_elements, static_cast<int>(std::ceil(for_waves))), most_graph_elements + 1);
         if (static_cast<int>(next.size()) > most_graph_elements + 1) return breaks;
         breaks = std::move(next);

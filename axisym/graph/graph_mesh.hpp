@@ -17,7 +17,7 @@ constexpr double stated_over_computed = 1.8;  // error stated / error computed b
 // The asked accuracy sets it, a failed attempt tightens it.
 struct GraphSettings {
     double time_tolerance = 0;
-    double defect = 0;  // remesh when the defect exceeds this: of E_ref, absolute once that is known
+    double mesh_loss = 0;  // largest energy lost to the mesh before a new one is made, over E_ref
     bool free_time = true, free_mesh = true;
     bool may_give_up = true;  // where the error exceeds the accuracy asked, and finer settings would help
     bool rosenbrock = false;  // Rosenbrock's method of long steps instead of IDA
@@ -33,21 +33,21 @@ GraphSettings tightened(GraphSettings s, const ErrorTransport::EnergyError& erro
 // reduced problem. With `symmetry` off: the whole period.
 Cell cell_of(const Tube& tube, bool symmetry);
 
-// Elements such that the energy lost to the spline (the defect of Forms::observe) is about `target`, judging by the
+// Elements such that the energy lost to the spline (the mesh loss of Forms::observe) is about `target`, judging by the
 // present mesh: sizes follow the local need and grow by at most a fixed ratio. At least `fewest`, and with the same
 // grading at most `most`.
-std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& mesh_loss, double target,
                                    int fewest, int most);
 
 // The same by division of the present elements: the new space contains the old one. Ends early, before the end of the
 // cell, where there would be more than `most`.
-std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& defect, double target,
+std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& mesh_loss, double target,
                                    int most);
 
-// The defect of each element that the flow from x will soon develop: the largest over x itself and single
+// The mesh loss of each element that the flow from x will soon develop: the largest over x itself and single
 // linearly implicit Euler steps from it, whose sizes span six decades up to `span`. A start is often smooth and
 // grows its sharpest features within its first instants.
-std::vector<double> foreseen_defect(const Forms& forms, const Eigen::VectorXd& x, double span);
+std::vector<double> foreseen_mesh_loss(const Forms& forms, const Eigen::VectorXd& x, double span);
 
 constexpr int most_graph_elements = 4000;  // of one cell
 
@@ -66,8 +66,8 @@ struct GraphMesh {
     std::vector<std::array<Eigen::VectorXd, 2>> modes;  // functionals of those that are tracked
 
     double place(double z) const;  // in [0, length)
-    // At coefficients x with rates v, radii refined between quadrature points; `defect` as Forms::observe.
-    Observation look(const double* x, const double* v, std::vector<double>* defect) const;
+    // At coefficients x with rates v, radii refined between quadrature points; `mesh_loss` as Forms::observe.
+    Observation look(const double* x, const double* v, std::vector<double>* mesh_loss) const;
 };
 
 // Breaks suitable for the initial shape and, as far as can be foreseen, for how the flow changes it.

@@ -13,8 +13,8 @@ SeriesTable<GraphRow> graph_series(const Problem& c) {
     for (const int n : tracked_graph_modes(c)) waves.push_back(std::to_string(n));
     SeriesTable<GraphRow> table;
     table.add({{"time", [](const GraphRow& r) { return r.time; }},
-               {"step_size", [](const GraphRow& r) { return r.flow.step_size(); }},
-               {"order", [](const GraphRow& r) { return static_cast<double>(r.flow.order()); }},
+               {"step_size", [](const GraphRow& r) { return r.integrator.step_size(); }},
+               {"order", [](const GraphRow& r) { return static_cast<double>(r.integrator.order()); }},
                {"newton_iterations", [](const GraphRow& r) { return static_cast<double>(r.newton_iterations); }},
                {"energy", [](const GraphRow& r) { return r.o.energy; }}});
     table.add_family("energy_<kl>", term_names(c.energy),
@@ -22,21 +22,21 @@ SeriesTable<GraphRow> graph_series(const Problem& c) {
     if (c.energy.kg > 0) table.add({{"energy_kg", [](const GraphRow& r) { return r.o.energy_kg; }}});
     table.add({{"free_energy", [](const GraphRow& r) { return r.o.free_energy; }},
                {"dissipation", [](const GraphRow& r) { return r.o.dissipation; }},
-               {"identity_defect", [](const GraphRow& r) { return r.identity_defect; }},
+               {"identity_defect", [](const GraphRow& r) { return r.imbalance; }},
                {"area", [](const GraphRow& r) { return r.o.area; }},
                {"volume", [](const GraphRow& r) { return r.o.volume; }},
                {"r_min", [](const GraphRow& r) { return r.o.r_min; }},
                {"r_max", [](const GraphRow& r) { return r.o.r_max; }}});
     table.add_family("mode_<n>", waves, [](const GraphRow& r, std::size_t wave) {
-        const Eigen::Map<const Eigen::VectorXd> x(r.x, r.stage.space.size());
-        const auto& f = r.stage.modes[wave];
+        const Eigen::Map<const Eigen::VectorXd> x(r.x, r.mesh.space.size());
+        const auto& f = r.mesh.modes[wave];
         return std::hypot(f[0].dot(x), f[1].dot(x));
     });
-    table.add({{"tension", [](const GraphRow& r) { return r.stage.forms.loads().tension; }},
-               {"pressure", [](const GraphRow& r) { return r.stage.forms.loads().pressure; }},
+    table.add({{"tension", [](const GraphRow& r) { return r.mesh.forms.loads().tension; }},
+               {"pressure", [](const GraphRow& r) { return r.mesh.forms.loads().pressure; }},
                {"force",
                 [](const GraphRow& r) {
-                    return r.stage.forms.axial_force(Eigen::Map<const Eigen::VectorXd>(r.x, r.stage.space.size()));
+                    return r.mesh.forms.axial_force(Eigen::Map<const Eigen::VectorXd>(r.x, r.mesh.space.size()));
                 }},
                {"energy_error", [](const GraphRow& r) { return r.energy_error; }},
                {"elements", [](const GraphRow& r) { return static_cast<double>(r.elements); }},
@@ -68,7 +68,7 @@ void restart_fields(Fields&& f, State& s) {
     f.number("restart_reference_energy", s.reference_energy);
     f.number("restart_energy_start", s.energy_start), f.number("restart_dissipated", s.dissipated);
     f.number("restart_error_max", s.error_max), f.number("restart_time_tolerance", s.time_tolerance);
-    f.number("restart_defect", s.defect), f.number("restart_least_symbol", s.least_symbol);
+    f.number("restart_defect", s.mesh_loss), f.number("restart_least_symbol", s.least_symbol);
     f.number("restart_rosenbrock", s.rosenbrock), f.number("restart_attempts", s.attempts);
     f.array("restart_breaks", s.breaks), f.array("restart_coefficients", s.coefficients);
     f.array("restart_error_total", s.error_total), f.array("restart_error_spatial", s.error_spatial);

@@ -18,10 +18,10 @@ struct GraphRow {
     double time;
     const Observation& o;
     const double* x;
-    const GraphMesh& stage;
-    const TimeIntegrator& flow;
+    const GraphMesh& mesh;
+    const TimeIntegrator& integrator;
     long newton_iterations;
-    double identity_defect, energy_error;
+    double imbalance, energy_error;
     int elements;
     double wall_seconds;
 };
@@ -34,7 +34,7 @@ struct GraphRestart {
     std::vector<double> breaks;
     Eigen::VectorXd coefficients, error_total, error_spatial;
     double reference_energy = 0, energy_start = 0, dissipated = 0, error_max = 0;
-    double time_tolerance = 0, defect = 0, least_symbol = 0;  // the defect absolute
+    double time_tolerance = 0, mesh_loss = 0, least_symbol = 0;  // the mesh loss absolute
     bool rosenbrock = false;
     int attempts = 1;
 };

@@ -26,7 +26,7 @@ public:
         const GraphRestart begun = graph_restart(*restart);
         settings_ = first_graph_settings(c, begun.rosenbrock);
         settings_.time_tolerance = begun.time_tolerance;
-        settings_.defect = begun.defect / begun.reference_energy;
+        settings_.mesh_loss = begun.mesh_loss / begun.reference_energy;
         count_ = begun.attempts;
         if (c.time.integrator == Integrator::rosenbrock && !begun.rosenbrock)
             fallback_ = "IDA has integrated the run: time.integrator = \"rosenbrock\" failed before it was interrupted";

@@ -14,7 +14,7 @@ namespace tubule::axisym {
 namespace {
 
 // Measured choices: docs/decisions/graphs.md, "Ask for accuracy".
-constexpr double first_remesh_margin = 1.0 / 10;  // defect after a remesh / defect before
+constexpr double first_remesh_margin = 1.0 / 10;  // mesh loss after a remesh / that before
 constexpr int few_steps = 10;                     // between two remeshes of a shape that keeps sharpening
 constexpr int most_failures = 3;                  // of the integrator at one state
 constexpr double path_error = 0.01;               // of states within a step, at most, relative to what was asked
@@ -24,19 +24,19 @@ constexpr double hopeless_error = 0.1;            // of E_ref: explicit settings
 }  // namespace
 
 double GraphSimulation::Now::lost() const {
-    return std::accumulate(defect.begin(), defect.end(), 0.0);
+    return std::accumulate(mesh_loss.begin(), mesh_loss.end(), 0.0);
 }
 
 const Observation& GraphSimulation::observe(double t, const double* x, const double* v) {
     if (t != now_.time) {
-        now_.o = mesh_->look(x, v, &now_.defect);
+        now_.o = mesh_->look(x, v, &now_.mesh_loss);
         now_.time = t;
     }
     return now_.o;
 }
 
-void GraphSimulation::use_mesh(std::unique_ptr<GraphMesh> stage) {
-    mesh_ = std::move(stage);
+void GraphSimulation::use_mesh(std::unique_ptr<GraphMesh> mesh) {
+    mesh_ = std::move(mesh);
     summary.elements = mesh_->space.elements() * mesh_->space.cell().images();
 }
 
@@ -101,7 +101,7 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
     const Eigen::VectorXd x = mesh_->space.project(shape);
     const Forms& forms = mesh_->forms;
     summary.reference_energy = reference_energy(case_, forms.free_energy(x), forms.reference_energy(x));
-    settings_.defect *= summary.reference_energy;
+    allowed_loss_ = settings_.mesh_loss * summary.reference_energy;
     ErrorTransport& transport = mesh_->transport;
     transport.total = transport.space().project(shape) - transport.space().prolong(mesh_->space, x);
     make_integrator(x, mesh_->forms.rate(x), 0, 0);
@@ -117,7 +117,7 @@ GraphSimulation::GraphSimulation(const Problem& c, const RunClock& clock, const 
     mesh_->transport.set(state.error_total, state.error_spatial);
     summary.reference_energy = state.reference_energy;
     settings_.time_tolerance = state.time_tolerance;
-    settings_.defect = state.defect;
+    allowed_loss_ = state.mesh_loss;
     past_.energy_start = state.energy_start;
     past_.dissipated = state.dissipated;
     error_.largest = state.error_max;
@@ -203,7 +203,7 @@ std::optional<StopReport> GraphSimulation::remesh() {
     remesh_margin_ = soon ? std::max(remesh_margin_ / 8, 1e-3) : first_remesh_margin;
     const double t = integrator_->time();
     const Observation o = now_.o;
-    auto breaks = refined_breaks(mesh_->space, now_.defect, settings_.defect * remesh_margin_, most_graph_elements);
+    auto breaks = refined_breaks(mesh_->space, now_.mesh_loss, allowed_loss_ * remesh_margin_, most_graph_elements);
     if (static_cast<int>(breaks.size()) > most_graph_elements + 1) {
         if (is_about_to_overhang(o)) return overhang(o, *mesh_, integrator_->x(), integrator_->time());
         return StopReport{Stop::resolution_lost, t,
@@ -216,7 +216,7 @@ std::optional<StopReport> GraphSimulation::remesh() {
     const Eigen::VectorXd projected = next->space.prolongation(mesh_->space) * x;  // all knots of before are here
     next->transport.inherit(mesh_->transport, x, projected);
     const double step = integrator_->step_size();
-    use_mesh(std::move(next));  // from here on nothing pauses: stage and flow belong together
+    use_mesh(std::move(next));  // from here on nothing pauses: mesh and integrator belong together
     make_integrator(projected, mesh_->forms.rate(projected), t, is_rosenbrock() ? step : 0);
     ++meshes_;
     return std::nullopt;
@@ -293,7 +293,7 @@ void GraphSimulation::accept() {
 }
 
 std::optional<StopReport> GraphSimulation::adapt_mesh() {
-    if (!settings_.free_mesh || now_.lost() <= settings_.defect) return std::nullopt;
+    if (!settings_.free_mesh || now_.lost() <= allowed_loss_) return std::nullopt;
     if (auto stop = transport_error()) return stop;
     return remesh();
 }
@@ -380,23 +380,23 @@ std::vector<double> GraphSimulation::row(double t, double error, const Observati
 }
 
 Record GraphSimulation::View::record() const {
-    const GraphMesh& stage = *run.mesh_;
+    const GraphMesh& mesh = *run.mesh_;
     GraphRestart state;
-    state.cell = stage.space.cell();
-    state.breaks = stage.space.breaks();
+    state.cell = mesh.space.cell();
+    state.breaks = mesh.space.breaks();
     state.coefficients = x;
-    state.error_total = stage.transport.total;
-    state.error_spatial = stage.transport.spatial();
+    state.error_total = mesh.transport.total;
+    state.error_spatial = mesh.transport.spatial();
     state.reference_energy = run.summary.reference_energy;
     state.time_tolerance = run.settings_.time_tolerance;
-    state.defect = run.settings_.defect;
+    state.mesh_loss = run.allowed_loss_;
     state.energy_start = run.past_.energy_start;
     state.dissipated = run.dissipated(t);
     state.error_max = run.error_.largest;
     state.least_symbol = run.least_symbol_.value_or(0);
     state.rosenbrock = run.is_rosenbrock();
     state.attempts = run.summary.attempts;
-    return graph_record(t, stage.space, state, v, o.energy);
+    return graph_record(t, mesh.space, state, v, o.energy);
 }
 
 }  // namespace tubule::axisym

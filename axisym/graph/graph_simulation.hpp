@@ -44,7 +44,7 @@ public:
 private:
     struct State;
     struct View;
-    // Before the present flow began.
+    // Before the present integrator began.
     struct Past {
         double energy_start = 0, dissipated = 0;
         IntegratorCounters counters;
@@ -61,13 +61,13 @@ private:
     struct Now {
         double time = std::numeric_limits<double>::quiet_NaN();
         Observation o;
-        std::vector<double> defect;
+        std::vector<double> mesh_loss;
         double lost() const;
     };
 
     const Observation& observe(double t, const double* x, const double* v);
     const Observation& observe() { return observe(integrator_->time(), integrator_->x(), integrator_->v()); }
-    void use_mesh(std::unique_ptr<GraphMesh> stage);
+    void use_mesh(std::unique_ptr<GraphMesh> mesh);
     ImplicitSystem system();
     bool is_rosenbrock() const { return settings_.rosenbrock; }
     void make_integrator(const Eigen::VectorXd& x, const Eigen::VectorXd& v, double t, double first_step);
@@ -97,12 +97,13 @@ private:
     TimeIntegrator::Outcome outcome_ = TimeIntegrator::Outcome::step;  // of the last step
     Now now_;
     std::vector<std::pair<double, Observation>> seen_;  // on the way of the last step, by time
-    StepIntegral dissipated_;                           // since the present flow began
+    StepIntegral dissipated_;                           // since the present integrator began
     GraphError error_;
     double error_before_ = 0;  // at the begin of the last step
     Past past_;
     Good good_;
     int meshes_ = 1;
+    double allowed_loss_ = 0;  // to the mesh, absolute
     double remesh_margin_;
     std::optional<double> least_symbol_;  // of a flow that is well-posed
 };
