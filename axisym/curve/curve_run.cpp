@@ -64,6 +64,8 @@ public:
         else
             loop.begin(start_.note);
         loop.go();
+        // Only ends that are alike can be compared.
+        if (!can_go_on(run_->summary.stop.reason)) coarser_->lead_to(HUGE_VAL);
         judge();
         return run_->summary;
     }
@@ -91,10 +93,9 @@ public:
     }
 
 private:
-    // The stated error. The coarser run goes to its end first: only ends that are alike can be compared.
+    // The stated error.
     void judge() {
         RunSummary& s = run_->summary;
-        if (!can_go_on(s.stop.reason)) coarser_->lead_to(HUGE_VAL);
         const StopReport other = coarser_->stop().value_or(StopReport{s.stop.reason, s.stop.time, "", ""});
         s.estimated_error = s.reference_energy > 0 ? run_->error / s.reference_energy : 1;
         const auto unknown = [&](const std::string& why) {

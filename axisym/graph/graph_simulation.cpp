@@ -140,37 +140,35 @@ GraphLimits GraphSimulation::limits() const {
     return {case_.accuracy.r_min, least_symbol_.value_or(0)};
 }
 
-// Transports the error; the reason to stop if it exceeds the tolerance and finer settings would help.
-std::optional<StopReport> GraphSimulation::transport_error() {
-    error_.transport(mesh_->transport, now_.o);
+// Where the error exceeds the tolerance and finer settings would help, a finer run replaces this one, and the report is
+// not shown.
+std::optional<StopReport> GraphSimulation::find_curable_error() {
     const double allowed = case_.accuracy.energy * summary.reference_energy / stated_over_computed;
     gave_up = settings_.may_give_up && error_.is_curable(allowed, settings_.free_mesh, settings_.free_time);
-    if (!gave_up) return std::nullopt;  // the report below is not shown: a finer run replaces this one
+    if (!gave_up) return std::nullopt;
     return StopReport{Stop::resolution_lost, integrator_->time(), "the error exceeds the requested accuracy", ""};
 }
 
-// In gradient flow the energy cannot rise: a rise is an error. Where it exceeds the known error and the tolerance, the
-// run returns to the last good state. So it does where the path of a long step leaves the membrane between its ends.
-std::optional<StopReport> GraphSimulation::find_rise(const Observation& o) {
-    const double asked = case_.accuracy.energy * summary.reference_energy;
-    double rise = o.free_energy - good_.least_energy, on_path = rise;
+// How far the last step has raised the energy, and how far the tolerance and the known error allow it: in gradient flow
+// it cannot rise. The path of a long step counts where it leaves the membrane between its ends.
+std::pair<double, double> GraphSimulation::rise(const Observation& o) {
+    const double asked = case_.accuracy.energy * summary.reference_energy, rise = o.free_energy - good_.least_energy;
+    double on_path = rise;
     for (const auto& [t, seen] : seen_) on_path = std::fmax(on_path, seen.free_energy - good_.least_energy);
     if (rise > std::max(asked, stated_over_computed * error_.largest)) error_.transport(mesh_->transport, o);
     const double known = std::max(asked, stated_over_computed * error_.now());
-    if (on_path > std::max(known, hopeless_error * summary.reference_energy)) rise = on_path;
-    if (rise <= known) {
-        error_.largest = std::max(error_.largest, rise / stated_over_computed);
-        good_.least_energy = std::min(good_.least_energy, o.free_energy);
-        return std::nullopt;
-    }
+    return {on_path > std::max(known, hopeless_error * summary.reference_energy) ? on_path : rise, known};
+}
+
+// Back to the last good state.
+StopReport GraphSimulation::undo_rise(double rise) {
     error_.latest = {rise, 0};
     gave_up = settings_.may_give_up && settings_.free_time;
     return_to_good();
-    return StopReport{
-        Stop::resolution_lost, good_.time,
-        fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
-                    rise / summary.reference_energy),
-        "use a tighter accuracy.energy; check that the energy resists bending where H = H0"};
+    return {Stop::resolution_lost, good_.time,
+            fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
+                        rise / summary.reference_energy),
+            "use a tighter accuracy.energy; check that the energy resists bending where H = H0"};
 }
 
 std::optional<StopReport> GraphSimulation::check_error() {
@@ -277,12 +275,18 @@ std::optional<StopReport> GraphSimulation::advance(double until) {
         mesh_->transport.add_step(*integrator_, before, is_rosenbrock());
         dissipated_.add(t, o.dissipation);
     }
-    return find_rise(o);
+    const auto [rise, allowed] = this->rise(o);
+    if (!(rise <= allowed)) return undo_rise(rise);
+    error_.largest = std::max(error_.largest, rise / stated_over_computed);
+    good_.least_energy = std::min(good_.least_energy, o.free_energy);
+    return std::nullopt;
 }
 
 std::optional<StopReport> GraphSimulation::update_error() {
     const bool due = error_.due(now_.o, is_rosenbrock());
-    return due || outcome_ != TimeIntegrator::Outcome::step ? transport_error() : std::nullopt;
+    if (!due && outcome_ == TimeIntegrator::Outcome::step) return std::nullopt;
+    error_.transport(mesh_->transport, now_.o);
+    return find_curable_error();
 }
 
 void GraphSimulation::accept() {
@@ -294,7 +298,8 @@ void GraphSimulation::accept() {
 
 std::optional<StopReport> GraphSimulation::adapt_mesh() {
     if (!settings_.free_mesh || now_.lost() <= allowed_loss_) return std::nullopt;
-    if (auto stop = transport_error()) return stop;
+    error_.transport(mesh_->transport, now_.o);
+    if (auto stop = find_curable_error()) return stop;
     return remesh();
 }
 

@@ -74,8 +74,9 @@ private:
     void return_to_good();
 
     std::optional<StopReport> recover();
-    std::optional<StopReport> find_rise(const Observation& o);
-    std::optional<StopReport> transport_error();
+    std::pair<double, double> rise(const Observation& o);
+    StopReport undo_rise(double rise);
+    std::optional<StopReport> find_curable_error();
     GraphLimits limits() const;
     std::optional<StopReport> remesh();
     StopReport failure(const std::string& what) const;
