@@ -131,14 +131,10 @@ Record curve_record(double time, const CurveMotion& motion, const CurveRestart& 
     Record out;
     out.time = time, out.kind = RecordKind::curve;
     out.numbers = {{"energy", energy}, {"length", space.length(state.y.data())}};
-    const auto add = [&](const char* name, double Sample::*member) {
-        std::vector<double> values;
-        for (const Sample& s : samples) values.push_back(s.*member);
-        out.arrays.push_back(array(name, std::move(values)));
-    };
-    add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K), add("u_n", &Sample::u_n);
-    if (motion.law().inextensible) add("u_t", &Sample::u_t), add("p", &Sample::p);
-    if (motion.law().swirls) add("u_theta", &Sample::u_theta);
+    add_columns(out, samples,
+                {{"r", &Sample::r}, {"z", &Sample::z}, {"H", &Sample::H}, {"K", &Sample::K}, {"u_n", &Sample::u_n}});
+    if (motion.law().inextensible) add_columns(out, samples, {{"u_t", &Sample::u_t}, {"p", &Sample::p}});
+    if (motion.law().swirls) add_columns(out, samples, {{"u_theta", &Sample::u_theta}});
     if (motion.forms().bending().H0_varies())  // of a whole cell or period
         out.arrays.push_back(array("H0", motion.forms().H0_at(state.y.head(space.size()), parameters)));
     restart_fields(RecordWriter(out), state);

@@ -1,9 +1,12 @@
 // Where frames sample a profile.
 #pragma once
 
+#include <initializer_list>
+#include <utility>
 #include <vector>
 
 #include "axisym/splines/curve_space.hpp"
+#include "common/result/record.hpp"
 
 namespace tubule::axisym {
 
@@ -35,6 +38,17 @@ auto sample_profile(const CurveSpace& space, At&& at, Reflect&& reflect) {
         samples.push_back(image);
     }
     return samples;
+}
+
+// Columns of samples as arrays of a record.
+template <class Sample>
+void add_columns(Record& out, const std::vector<Sample>& samples,
+                 std::initializer_list<std::pair<const char*, double Sample::*>> columns) {
+    for (const auto& [name, member] : columns) {
+        std::vector<double> values;
+        for (const Sample& s : samples) values.push_back(s.*member);
+        out.arrays.push_back(array(name, std::move(values)));
+    }
 }
 
 }  // namespace tubule::axisym

@@ -140,21 +140,6 @@ int elements_of(const Equilibrium& e) {
     return e.space->images() * e.space->splines().elements();
 }
 
-// At the points of a frame, of half a shape with their images.
-std::vector<double> samples_of_H0(const Problem& c, const Equilibrium& e) {
-    std::vector<double> s;
-    sample_profile(
-        *e.space,
-        [&](double at) {
-            s.push_back(at);
-            return sample(*e.space, e.x, at);
-        },
-        [](Sample&) {});
-    std::vector<double> out = CurveForms(*e.space, c.energy).H0_at(e.x, s);
-    if (e.space->images() == 2) out.insert(out.end(), out.rbegin() + 1, out.rend());
-    return out;
-}
-
 // What the values of a row come from: a shape.
 struct ShapeRow {
     int number;
@@ -268,8 +253,12 @@ private:
 
     Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
         const Equilibrium& e = point.shape;
-        const std::vector<Sample> samples = sample_profile(
-            *e.space, [&](double s) { return sample(*e.space, e.x, s); }, [](Sample&) {});
+        std::vector<double> parameters;
+        const auto sample_at = [&](double s) {
+            parameters.push_back(s);
+            return sample(*e.space, e.x, s);
+        };
+        const std::vector<Sample> samples = sample_profile(*e.space, sample_at, [](Sample&) {});
         Record out;
         out.time = count_, out.kind = RecordKind::equilibrium;
         out.numbers = {{"energy", e.observed.energy},
@@ -277,15 +266,11 @@ private:
                        {"tension", e.sigma},
                        {"pressure", -e.lambda}};
         if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
-        const auto add = [&](const char* name, double Sample::*member) {
-            Array a{name, {samples.size()}, {}};
-            for (const Sample& s : samples) a.data.push_back(s.*member);
-            out.arrays.push_back(std::move(a));
-        };
-        add("r", &Sample::r), add("z", &Sample::z), add("H", &Sample::H), add("K", &Sample::K);
+        add_columns(out, samples, {{"r", &Sample::r}, {"z", &Sample::z}, {"H", &Sample::H}, {"K", &Sample::K}});
         if (c_.energy.H0_varies()) {
-            std::vector<double> H0 = samples_of_H0(c_, e);
-            out.arrays.push_back({"H0", {H0.size()}, std::move(H0)});
+            std::vector<double> H0 = CurveForms(*e.space, c_.energy).H0_at(e.x, parameters);
+            if (e.space->images() == 2) H0.insert(H0.end(), H0.rbegin() + 1, H0.rend());
+            out.arrays.push_back(array("H0", std::move(H0)));
         }
         for (const ModeRates& mode : modes)
             if (!mode.shape.empty())
