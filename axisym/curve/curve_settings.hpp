@@ -21,18 +21,17 @@ struct CurveSettings {
 // all `images` of the cell.
 CurveSettings first_settings(const Problem& c, int images);
 
-// The first step of the integrator relative to what the initial state requires, and the largest ratio of a step to the
-// last. A run of short duration takes all its steps as fast as they may grow, whatever its tolerance: only if they
-// grow differently do the runs of a pair have different errors.
+// The first step relative to what the initial state requires, and the largest ratio of a step to the last. A short run
+// takes all steps as fast as they may grow. With equal growth both runs of a pair would have the same error and differ
+// by nothing: the coarser one begins with a step four times as long, and grows by 8 instead of 2.
 double first_step_factor(const CurveSettings& s);
 double step_growth_of(const CurveSettings& s);
 
 // Settings of the other run of a pair.
 CurveSettings coarser(const CurveSettings& s);
 
-// Factor of the elements of the next pair, after one whose runs differed by `excess` times the tolerance; or, where the
-// error due to the mesh is known, after one where that was `excess_of_mesh` times what is allowed. It is an estimate:
-// where smaller time tolerances did not reduce the error, more elements may.
+// Factor of the elements after a pair whose error was `excess` times what was asked; or, where the loss to the mesh is
+// known, `excess_of_mesh` times what is allowed. Unless error_falls, smaller steps did not help: then at least 1.5.
 double mesh_growth(double excess);
 double mesh_growth(double excess_of_mesh, bool error_falls);
 // The next pair: a tenth of the tolerance, and `mesh` times as many elements.

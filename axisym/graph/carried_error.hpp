@@ -1,7 +1,7 @@
-// Estimates how far the computed profile is from the exact one. The error obeys the linearised flow, driven by the
-// residual of the flow along the path of the run in time, tested with splines on halved elements; the part that the
-// steps in time make is driven by what that residual is more than at the end of a step, tested with the splines of the
-// run. Linearly implicit Euler steps carry it along, each spanning some steps of the run.
+// The error e of the profile, carried along with the run. On halved elements it obeys the linearised flow
+// M e_t + J e = -(residual of the computed path). A second one, on the mesh of the run, is driven only by the residual
+// in excess of that at the end of a step: the part of e due to time steps. Both advance by linearly implicit Euler
+// steps, each over several steps of the run.
 #pragma once
 
 #include <Eigen/Core>
