@@ -7,7 +7,7 @@
 
 #include "axisym/equilibrium/mode_stability.hpp"
 #include "common/case/problem.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "common/theory/vesiculation.hpp"
 
 namespace tubule::axisym {

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "axisym/graph/graph_output.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule::axisym {
 
-// As run(); stops with `overhang` where the profile gets a vertical tangent. The run carries its error along
+// As run_profile(); stops with `overhang` where the profile gets a vertical tangent. The run carries its error along
 // (carried_error.hpp); where that exceeds the accuracy asked, it starts again with finer settings.
 RunSummary run_graph(const Problem& c, RunObserver& observer, const Record* restart = nullptr);
 

@@ -5,14 +5,14 @@
 #include <string>
 
 #include "common/case/problem.hpp"
-#include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule {
 
 // The runs of a case, and how their error is estimated. There are: an error that the run itself carries along
 // (axisym/graph/graph_run), a run beside a coarser one (axisym/curve/curve_run, surface3d/run/motion_run), a shape on
-// several meshes (surface3d/run/run).
+// several meshes (surface3d/run/single_surface).
 class EstimatedRuns {
 public:
     virtual ~EstimatedRuns() = default;

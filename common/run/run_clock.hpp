@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "common/case/case.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "common/solve/pause.hpp"
 
 namespace tubule {

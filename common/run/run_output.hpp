@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/case/case.hpp"
-#include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/result/record.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "common/run/run_output.hpp"
 #include "common/solve/sparse.hpp"
 

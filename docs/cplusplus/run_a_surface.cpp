@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/case/read.hpp"
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/run_surface.hpp"
 
 using namespace tubule;
 
@@ -67,7 +67,7 @@ output = [0.01]
 )",
                               {}, "in memory");
     Watch watch(surface3d::series_names(c));
-    const RunSummary run = surface3d::run(c, watch);
+    const RunSummary run = surface3d::run_surface(c, watch);
     watch.print();
     std::printf("%s at t = %g\n", std::string(name(run.stop.reason)).c_str(), run.stop.time);
     return exit_code(run.stop.reason);

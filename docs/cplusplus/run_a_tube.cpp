@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 #include "common/case/read.hpp"
 #include "common/result/result.hpp"
 
@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
         const auto series = axisym::series_names(c);
         ResultWriter writer = ResultWriter::create(given ? argv[2] : "run_a_tube.hdf", {c.text, c.sets}, {}, series);
         Watch watch(writer, series);
-        const RunSummary run = axisym::run(c, watch);
+        const RunSummary run = axisym::run_profile(c, watch);
         writer.finish({{"stop", std::string(name(run.stop.reason))}});
         std::printf("%s: %s\nenergy %.6f, error at most %.1e of E_ref = %.4f\n",
                     std::string(name(run.stop.reason)).c_str(), run.stop.message.c_str(), run.energy,

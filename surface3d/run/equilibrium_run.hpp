@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {

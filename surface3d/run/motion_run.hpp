@@ -6,7 +6,7 @@
 
 #include "common/case/problem.hpp"
 #include "common/result/record.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule::surface3d {

@@ -35,7 +35,7 @@ TEST(CurveResume, endsAsUndisturbedOverSeveralPairs) {
         SCOPED_TRACE(model);
         const Case c = sharp(model);
         Watch undisturbed;
-        const RunSummary whole = run(c, undisturbed);
+        const RunSummary whole = run_profile(c, undisturbed);
         ASSERT_EQ(whole.stop.reason, Stop::finished) << whole.stop.message;
         ASSERT_GE(whole.attempts, 2);
         Watch watch;
@@ -45,7 +45,7 @@ TEST(CurveResume, endsAsUndisturbedOverSeveralPairs) {
         for (int times = 0;; ++times) {
             ASSERT_LT(times, 100);
             watch.looks = 0, watch.most_looks = undisturbed.looks / 8;
-            s = run(c, watch, restart ? &*restart : nullptr);
+            s = run_profile(c, watch, restart ? &*restart : nullptr);
             if (s.stop.reason != Stop::interrupted) break;
             later_pairs += s.attempts > 1;
             restart = watch.rewound();
@@ -65,12 +65,12 @@ TEST(CurveResume, endsAsUndisturbedOverSeveralPairs) {
 TEST(CurveResume, aRunThatIsInterruptedLeavesACheckpointAndNoFrameThatNobodyAskedFor) {
     const Case c = sharp("gradient-flow");
     Watch whole;
-    run(c, whole);
+    run_profile(c, whole);
     ASSERT_EQ(whole.frames.size(), 3u);  // the start, one output, the end
     struct InReportedRun : Watch {
         bool interrupted() override { return rows.size() > 20; }
     } late;
-    const RunSummary s = run(c, late);
+    const RunSummary s = run_profile(c, late);
     ASSERT_EQ(s.stop.reason, Stop::interrupted);
     ASSERT_EQ(late.checkpoints.size(), 1u);
     EXPECT_EQ(late.checkpoints[0].time, s.stop.time);
@@ -81,13 +81,13 @@ TEST(CurveResume, theCoarserRunResumesToo) {
     Case c = sharp("stokes");
     Watch watch;
     watch.most_looks = 60;
-    ASSERT_EQ(run(c, watch).stop.reason, Stop::interrupted);
+    ASSERT_EQ(run_profile(c, watch).stop.reason, Stop::interrupted);
     const Restart restart = watch.rewound().value();
     const Record coarser = nested(restart.record, "restart_coarser_", RecordKind::curve);
     EXPECT_GE(coarser.time, restart.record.time);
     Watch next;
     next.most_looks = 60;
-    run(c, next, &restart);
+    run_profile(c, next, &restart);
     ASSERT_EQ(next.checkpoints.size(), 1u);
     EXPECT_GT(nested(next.checkpoints[0], "restart_coarser_", RecordKind::curve).time, coarser.time);
 }
@@ -100,11 +100,11 @@ TEST(CurveResume, aLaterEndHasAKnownError) {
         c.accuracy.energy = later_pair ? 1e-4 : 0.05;
         c.time.end = 0.02;
         Watch first;
-        EXPECT_EQ(run(c, first).attempts > 1, later_pair);
+        EXPECT_EQ(run_profile(c, first).attempts > 1, later_pair);
         c.time.end = 0.03;
         Watch rest, whole;
         const Restart restart{first.frames.back()};
-        const RunSummary extended = run(c, rest, &restart), at_once = run(c, whole);
+        const RunSummary extended = run_profile(c, rest, &restart), at_once = run_profile(c, whole);
         EXPECT_EQ(extended.stop.reason, Stop::finished) << extended.stop.message;
         EXPECT_LT(extended.estimated_error, c.accuracy.energy);
         EXPECT_TRUE(extended.warnings.empty());

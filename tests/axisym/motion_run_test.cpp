@@ -7,7 +7,7 @@
 
 #include "axisym/curve/curve_motion.hpp"
 #include "axisym/curve/curve_run.hpp"
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 #include "axisym/splines/arc_length.hpp"
 #include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
@@ -55,7 +55,7 @@ struct Outcome {
 
 Outcome run_text(const std::string& text, const std::vector<std::string>& sets = {}) {
     Outcome out{parse_case("tier = \"axisym\"\n" + text, sets, "case.toml"), {}, {}};
-    out.summary = run(out.c, out.watch);
+    out.summary = run_profile(out.c, out.watch);
     return out;
 }
 
@@ -265,13 +265,13 @@ TEST(CurveRun, goesOnAfterAnInterruption) {
         const Case c = parse_case("tier = \"axisym\"\n" + spheroid,
                                   {std::string("model.kind=") + model, "accuracy.energy=1e-5"}, "case.toml");
         Watch whole, first, second;
-        const RunSummary expected = run(c, whole);
+        const RunSummary expected = run_profile(c, whole);
         first.interrupt_at = 0.1;
-        const RunSummary half = run(c, first);
+        const RunSummary half = run_profile(c, first);
         ASSERT_EQ(half.stop.reason, Stop::interrupted);
         ASSERT_LT(half.stop.time, 0.2);
         const Restart from{first.checkpoints.at(0)};
-        const RunSummary rest = run(c, second, &from);
+        const RunSummary rest = run_profile(c, second, &from);
         EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
         EXPECT_EQ(rest.elements, expected.elements);
         EXPECT_GE(second.rows.front()[0], half.stop.time);
@@ -286,11 +286,11 @@ TEST(CurveRun, goesOnWithElementsGradedAtSeams) {
         "kind = \"capsule\"\nradius = 0.5\nlength = 2.0\n[accuracy]\nenergy = 1e-3\n[time]\nend = 1.0\n";
     const Case c = parse_case(capsule, {}, "case.toml");
     Watch whole, first, second;
-    const RunSummary expected = run(c, whole);
+    const RunSummary expected = run_profile(c, whole);
     first.interrupt_at = 0.01;
-    ASSERT_EQ(run(c, first).stop.reason, Stop::interrupted);
+    ASSERT_EQ(run_profile(c, first).stop.reason, Stop::interrupted);
     const Restart from{first.checkpoints.at(0)};
-    const RunSummary rest = run(c, second, &from);
+    const RunSummary rest = run_profile(c, second, &from);
     EXPECT_EQ(rest.stop.reason, Stop::finished) << rest.stop.message;
     EXPECT_EQ(rest.elements, expected.elements);
     EXPECT_NEAR(rest.energy, expected.energy, 1e-3 * expected.reference_energy);
@@ -327,7 +327,7 @@ TEST(CurveRun, aGraphThatOverhangsGoesOnAsACurve) {
     c.discretisation.parametrisation.reset();
     c.time.output = {0.008, 0.01}, c.time.end = 0.01, c.accuracy.energy = 1e-4;
     Watch watch;
-    const RunSummary s = run(c, watch);
+    const RunSummary s = run_profile(c, watch);
     EXPECT_EQ(s.stop.reason, Stop::finished) << s.stop.message;
     const auto falls = [&](std::size_t frame) {  // somewhere z decreases along the profile
         for (const Array& a : watch.frames.at(frame).arrays)

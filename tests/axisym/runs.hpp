@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "axisym/equilibrium/equilibrium_run.hpp"
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 #include "tests/support/summary_detail.hpp"
 
 namespace tubule::axisym {
@@ -91,7 +91,7 @@ inline Outcome run_case(const Case& c, const Record* restart = nullptr,
     out.log.stop_when = std::move(stop_when);
     std::optional<Restart> from;
     if (restart) from = Restart{*restart};
-    out.summary = run(c, out.log, from ? &*from : nullptr);
+    out.summary = run_profile(c, out.log, from ? &*from : nullptr);
     const auto names = series_names(c);
     for (std::size_t i = 0; i < names.size(); ++i)
         for (const auto& row : out.log.rows) out.series[names[i]].push_back(row.at(i));

@@ -130,7 +130,7 @@ struct Outcome {
 };
 Outcome run_text(const std::string& text, const std::vector<std::string>& sets = {}) {
     Outcome out{parse_case("tier = \"axisym\"\n" + text, sets, "case.toml"), {}, {}};
-    out.summary = out.c.equilibrium ? run_equilibrium(out.c, out.log) : run(out.c, out.log);
+    out.summary = out.c.equilibrium ? run_equilibrium(out.c, out.log) : run_profile(out.c, out.log);
     return out;
 }
 

@@ -7,11 +7,11 @@
 
 #include "axisym/curve/curve_output.hpp"
 #include "axisym/graph/graph_output.hpp"
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 #include "common/case/read.hpp"
 #include "common/result/record.hpp"
 #include "surface3d/run/motion_frame.hpp"
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/run_surface.hpp"
 
 namespace tubule::restored_state_test {
 
@@ -80,7 +80,7 @@ std::string tube(const std::string& model) {
 TEST(RestoredState, ofAGraph) {
     const Case c = parse_case(tube("gradient-flow"), {}, "case.toml");
     Interrupted run(c, axisym::series_names(c), "graph.hdf");
-    ASSERT_EQ(axisym::run(c, run).stop.reason, Stop::interrupted);
+    ASSERT_EQ(axisym::run_profile(c, run).stop.reason, Stop::interrupted);
     const Record record = read_back(run);
     const axisym::GraphRestart s = axisym::graph_restart(record);
     Record state;
@@ -95,7 +95,7 @@ TEST(RestoredState, ofAGraph) {
 TEST(RestoredState, ofACurveAndItsPair) {
     const Case c = parse_case(tube("overdamped"), {}, "case.toml");
     Interrupted run(c, axisym::series_names(c), "curve.hdf");
-    ASSERT_EQ(axisym::run(c, run).stop.reason, Stop::interrupted);
+    ASSERT_EQ(axisym::run_profile(c, run).stop.reason, Stop::interrupted);
     const Record record = read_back(run);
     const axisym::CurveRestart s = axisym::curve_restart(record);
     Record state;
@@ -116,7 +116,7 @@ TEST(RestoredState, ofASurface) {
         "[accuracy]\nenergy = 0.1\n[time]\nend = 0.2\n",
         {}, "case.toml");
     Interrupted run(c, surface3d::series_names(c), "surface.hdf");
-    ASSERT_EQ(surface3d::run(c, run).stop.reason, Stop::interrupted);
+    ASSERT_EQ(surface3d::run_surface(c, run).stop.reason, Stop::interrupted);
     const Record record = read_back(run);
     const auto restored = surface3d::motion_restart(record, Problem(c).scheme);
     Record state = surface3d::state_record(restored.state, restored.memory);

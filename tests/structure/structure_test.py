@@ -153,8 +153,8 @@ class Outline(unittest.TestCase):
 
     def test_upwards(self):
         self.assertIsNone(upwards('axisym/curve/a.cpp', 'common/solve/b.hpp'))
-        self.assertIsNone(upwards('axisym/run.cpp', 'axisym/curve/b.hpp'))
-        self.assertIsNotNone(upwards('axisym/curve/a.cpp', 'axisym/run.hpp'))
+        self.assertIsNone(upwards('axisym/run_profile.cpp', 'axisym/curve/b.hpp'))
+        self.assertIsNotNone(upwards('axisym/curve/a.cpp', 'axisym/run_profile.hpp'))
         self.assertIsNotNone(upwards('axisym/curve/a.cpp', 'surface3d/mesh/b.hpp'))
         self.assertIsNotNone(upwards('common/case/a.cpp', 'axisym/splines/b.hpp'))
 

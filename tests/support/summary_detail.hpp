@@ -5,7 +5,7 @@
 #include <string>
 #include <variant>
 
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule {
 

@@ -16,7 +16,7 @@
 #include "surface3d/run/coarser_run.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/run_surface.hpp"
 #include "tests/missing_fields.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/surface3d/run_case.hpp"
@@ -279,7 +279,7 @@ protected:
         return start;
     }
     void run_with(const Start::Make& make) {
-        o.summary = run(o.c, Start(make, true), o.watch);
+        o.summary = run_surface(o.c, Start(make, true), o.watch);
         ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
         EXPECT_EQ(o.series("energy"), undisturbed().series("energy"));
     }
@@ -424,7 +424,7 @@ TEST(MotionRunStudy, TheCoarserRunGetsFewerTrianglesToo) {
     const Record& frame = whole.watch.frames.at(1);
     const Restart restart{frame, whole.watch.meshes.at(*frame.mesh)};
     Outcome rest = begin(wavy, sets);
-    rest.summary = run(rest.c, rest.watch, &restart);
+    rest.summary = run_surface(rest.c, rest.watch, &restart);
     EXPECT_EQ(rest.series("elements").front(), 180);
     EXPECT_EQ(rest.summary.energy, whole.summary.energy);  // bit for bit
     EXPECT_EQ(rest.summary.estimated_error, whole.summary.estimated_error);
@@ -697,7 +697,7 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     Watch watch;
     do {
         watch.looks = 0, watch.most_looks = undisturbed.looks / 10;
-        s = run(c, watch, restart ? &*restart : nullptr);
+        s = run_surface(c, watch, restart ? &*restart : nullptr);
         if (s.stop.reason != Stop::interrupted) break;
         ASSERT_LT(++times, 100);
         in_first_pair += watch.rows.size() > 1 && detail(s, "pairs") == 1;
@@ -739,13 +739,13 @@ TEST(MotionRun, AnInterruptionIsHeardBeforeAFinerRun) {
     ASSERT_EQ(watch.looks_at_discard.size(), 1u);
     Watch again;
     again.most_looks = watch.looks_at_discard.back() - 1;
-    const RunSummary s = run(c, again);
+    const RunSummary s = run_surface(c, again);
     EXPECT_EQ(s.stop.reason, Stop::interrupted);
     EXPECT_EQ(s.stop.time, c.time.end);
     EXPECT_CONTAINS(s.stop.message, "before a finer run");
     const Restart restart{again.frames.back(), again.meshes.back()};
     again = {};
-    const RunSummary end = run(c, again, &restart);
+    const RunSummary end = run_surface(c, again, &restart);
     EXPECT_EQ(detail(end, "pairs"), 2);
     EXPECT_NEAR(end.energy, whole.energy, 1e-9 * whole.reference_energy);
 }

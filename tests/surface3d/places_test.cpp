@@ -151,7 +151,7 @@ TEST(Places, BeadsAreDrawnApart) {
     const Record& frame = o.watch.frames.at(1);
     const Restart restart{frame, o.watch.meshes.at(*frame.mesh)};
     Outcome rest = begin(pulled, {});
-    rest.summary = run(rest.c, rest.watch, &restart);
+    rest.summary = run_surface(rest.c, rest.watch, &restart);
     for (const std::string name : {"free_energy", "force", "work", "bead_distance", "energy_error"})
         EXPECT_NEAR(rest.last(name), o.last(name), 1e-9 * E_ref) << name;
 }

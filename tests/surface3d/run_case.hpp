@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/case/read.hpp"
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/run_surface.hpp"
 #include "tests/support/summary_detail.hpp"
 
 namespace tubule::surface3d {
@@ -63,7 +63,7 @@ inline Outcome begin(const std::string& text, const std::vector<std::string>& se
 
 inline Outcome run_case(const std::string& text, const std::vector<std::string>& sets = {}) {
     Outcome out = begin(text, sets);
-    out.summary = run(out.c, out.watch);
+    out.summary = run_surface(out.c, out.watch);
     return out;
 }
 
@@ -73,11 +73,11 @@ inline Outcome expect_the_same_resumed(const Outcome& whole, const std::string& 
                                        std::size_t rows) {
     Outcome first = begin(text, sets), second = begin(text, sets);
     first.watch.most_rows = rows;
-    first.summary = run(first.c, first.watch);
+    first.summary = run_surface(first.c, first.watch);
     EXPECT_EQ(first.summary.stop.reason, Stop::interrupted);
     if (!first.watch.saved) throw std::runtime_error("no state was saved");
     const Restart restart{*first.watch.saved, first.watch.meshes.at(*first.watch.saved->mesh)};
-    second.summary = run(second.c, second.watch, &restart);
+    second.summary = run_surface(second.c, second.watch, &restart);
     EXPECT_EQ(second.summary.stop.reason, Stop::finished) << second.summary.stop.message;
     for (const std::string& name : names)
         EXPECT_NEAR(second.last(name), whole.last(name), 1e-9 * whole.summary.reference_energy) << name;

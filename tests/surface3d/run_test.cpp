@@ -1,7 +1,5 @@
 // Cases of tier surface3d: energies of exactly known shapes as accurate as asked and as stated, on every kind of mesh;
 // guards; refusals.
-#include "surface3d/run/run.hpp"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -12,6 +10,7 @@
 #include "common/case/read.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/result/start_frame.hpp"
+#include "surface3d/run/run_surface.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/paths.hpp"
 
@@ -41,7 +40,7 @@ struct Outcome {
 
 Outcome run_case(const std::string& shape, const std::vector<std::string>& sets = {}) {
     Outcome out{parse_case("tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\n" + shape, sets, "case.toml"), {}, {}};
-    out.summary = run(out.c, out.watch);
+    out.summary = run_surface(out.c, out.watch);
     return out;
 }
 
@@ -223,7 +222,7 @@ TEST(SurfaceRun, InterruptedAtOnce) {
         Impatient watch;
         const Case c =
             parse_case("tier = \"surface3d\"\n[energy]\nk20 = 1.0\n[shape]\n" + perturbed + elements, {}, "case.toml");
-        const RunSummary s = run(c, watch);
+        const RunSummary s = run_surface(c, watch);
         EXPECT_EQ(s.stop.reason, Stop::interrupted);
         EXPECT_EQ(s.estimated_error, 1);  // one mesh does not show the error
         for (const double value : watch.values) EXPECT_TRUE(std::isfinite(value));

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 #include "common/case/keys.hpp"
 #include "common/case/problem.hpp"
-#include "common/run/run.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/run/run_observer.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/motion_start.hpp"
@@ -240,13 +240,14 @@ void set_choice(RunSummary& s, const std::string& choice, const std::string& rea
 // On few triangles where these do, as docs/choosing.md has it; again as tier surface3d would choose them where the
 // error is larger than requested. A resumed run has the triangles that it had.
 RunSummary on_triangles(const Problem& c, const surface3d::Start& start, SurfacePart& part, const Restart* restart) {
-    if (restart || !c.accuracy.estimate || !few_triangles_do(c, start)) return surface3d::run(c, start, part, restart);
+    if (restart || !c.accuracy.estimate || !few_triangles_do(c, start))
+        return surface3d::run_surface(c, start, part, restart);
     Case few = c;
     few.surface.elements = surface3d::least_triangles;
-    RunSummary s = surface3d::run(few, start, part, nullptr);
+    RunSummary s = surface3d::run_surface(few, start, part, nullptr);
     if (!s.as_accurate_as_asked && !can_go_on(s.stop.reason)) {
         part.discard();
-        return surface3d::run(c, start, part, nullptr);
+        return surface3d::run_surface(c, start, part, nullptr);
     }
     s.details.emplace_back("triangles",
                            fmt::format("{}, since the initial shape is smooth", surface3d::least_triangles));
@@ -345,7 +346,7 @@ RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rat
     output.insert(output.end(), for_rates.begin(), for_rates.end());
     std::sort(output.begin(), output.end());
     Case c = case_.of_profile(case_.time.end, output);
-    RunSummary s = axisym::run(c, watch, restart);
+    RunSummary s = axisym::run_profile(c, watch, restart);
     const NoiseGrowth& growth = watch.growth();
     if (s.stop.reason != Stop::stationary || growth.empty() || watch.reached()) return s;
     for (int m = 1; m <= growth.modes(); ++m) {
@@ -354,7 +355,7 @@ RunSummary AutoRun::watched(ProfileWatch& watch, const std::set<double>& for_rat
         if (end < case_.automatic.largest) continue;
         c.time.stationary.reset();
         const Restart from{*watch.last_frame()};
-        return axisym::run(c, watch, &from);
+        return axisym::run_profile(c, watch, &from);
     }
     return s;
 }
@@ -375,7 +376,7 @@ RunSummary AutoRun::with_switch(const NoiseGrowth::Peak& at, const ProfileWatch&
     Case c = case_.of_profile(at.time, until(case_.time.output, at.time));
     c.time.stationary.reset();
     FirstPart part(file_, axisym_rows(), watch.growth(), at.time);
-    RunSummary s = axisym::run(c, part);
+    RunSummary s = axisym::run_profile(c, part);
     add_doubts(s, case_, watch.known(), watch.growth());
     if (s.stop.reason != Stop::finished || !part.last) {
         if (part.last) part.write(*part.last);

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "common/case/problem.hpp"
-#include "common/run/run.hpp"
-#include "surface3d/run/run.hpp"
+#include "common/run/run_observer.hpp"
+#include "surface3d/run/run_surface.hpp"
 #include "surface3d/run/start.hpp"
 
 namespace tubule {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "axisym/run.hpp"
-#include "surface3d/run/run.hpp"
+#include "axisym/run_profile.hpp"
+#include "surface3d/run/run_surface.hpp"
 
 namespace tubule {
 

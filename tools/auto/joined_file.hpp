@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/case/problem.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule {
 

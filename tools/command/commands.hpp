@@ -9,7 +9,7 @@
 
 #include "common/case/problem.hpp"
 #include "common/result/result.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "tools/run/advice.hpp"
 #include "tools/scan/ranks.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "axisym/curve/curve_setup.hpp"
 #include "common/case/read.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "common/solve/interrupt.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"

@@ -8,7 +8,7 @@
 
 #include "common/case/problem.hpp"
 #include "common/case/read.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule {
 

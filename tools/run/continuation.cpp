@@ -14,7 +14,7 @@
 #include "common/case/toml_input.hpp"
 #include "common/result/about.hpp"
 #include "common/result/start_frame.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule {
 namespace {

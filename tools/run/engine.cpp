@@ -3,9 +3,9 @@
 #include <stdexcept>
 
 #include "axisym/equilibrium/equilibrium_run.hpp"
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 #include "surface3d/run/equilibrium_run.hpp"
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/run_surface.hpp"
 #include "tools/auto/auto_run.hpp"
 #include "tools/auto/joined_file.hpp"
 
@@ -51,18 +51,15 @@ RunSummary Engine::run(RunObserver& observer, const Restart* restart, const Resu
     switch (case_.unknowns) {
         case Unknowns::graph:
         case Unknowns::curve:
-            return axisym::run(case_, observer, restart);
+            return axisym::run_profile(case_, observer, restart);
         case Unknowns::equilibrium:
             return axisym::run_equilibrium(case_, observer);
         case Unknowns::surface_equilibrium:
             return surface3d::run_equilibrium(case_, *choice_.start, observer);
         case Unknowns::automatic:
             return run_auto(case_, choice_, observer, restart, unfinished);
-        case Unknowns::surface:
-            if (restart) observer.discard();  // nothing moves: there is no partial state to resume from
-            return surface3d::run(case_, *choice_.start, observer);
         default:
-            return surface3d::run(case_, *choice_.start, observer, restart);
+            return surface3d::run_surface(case_, *choice_.start, observer, restart);
     }
 }
 

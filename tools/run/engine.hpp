@@ -8,7 +8,7 @@
 
 #include "common/case/problem.hpp"
 #include "common/result/record.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 #include "tools/auto/auto_run.hpp"
 
 namespace tubule {

@@ -19,7 +19,7 @@ void figure_run(benchmark::State& state, Integrator integrator) {
     double error = 0;
     for (auto _ : state) {
         ErrorWatch watch;
-        summary = run(c, watch);
+        summary = run_profile(c, watch);
         error = watch.error;
     }
     state.counters["error"] = error / summary.reference_energy;

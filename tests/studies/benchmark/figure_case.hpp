@@ -6,9 +6,9 @@
 #include <numbers>
 #include <span>
 
-#include "axisym/run.hpp"
-#include "tests/support/summary_detail.hpp"
+#include "axisym/run_profile.hpp"
 #include "tests/axisym/reference.hpp"
+#include "tests/support/summary_detail.hpp"
 
 namespace tubule::axisym {
 

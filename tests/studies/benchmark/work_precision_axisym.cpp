@@ -29,7 +29,7 @@ Point measure(const Case& c, int repeats) {
     for (int i = 0; i < repeats; ++i) {
         ErrorWatch watch;
         const double begin = cpu_milliseconds();
-        const RunSummary summary = run(c, watch);
+        const RunSummary summary = run_profile(c, watch);
         times.push_back(cpu_milliseconds() - begin);
         point = {c.accuracy.energy, watch.error / summary.reference_energy, summary.estimated_error, 0};
         if (summary.stop.reason != Stop::finished) point.error = INFINITY;

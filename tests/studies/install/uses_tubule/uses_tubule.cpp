@@ -5,7 +5,7 @@
 #include "axisym/curve/shape_integrals.hpp"
 #include "axisym/splines/arc_length.hpp"
 #include "common/case/read.hpp"
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/run_surface.hpp"
 
 int main() {
     using namespace tubule;
@@ -15,7 +15,7 @@ int main() {
         "tier = 'surface3d'\n[energy]\nk20 = 0.5\n[shape]\nkind = 'sphere'\nradius = 1.5\n[accuracy]\nenergy = 1e-3\n",
         {}, "sphere.toml");
     RunObserver nobody;
-    const RunSummary run = surface3d::run(c, nobody);
+    const RunSummary run = surface3d::run_surface(c, nobody);
     const double energy = 0.5 * 16 * pi;  // k20 INT H^2 dS with H = -2/R
     std::printf("area %.15g volume %.15g energy %.15g\n", area, volume, run.energy);
     const bool right = std::abs(area / (4 * pi * R * R) - 1) < 1e-12 &&

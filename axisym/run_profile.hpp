@@ -6,7 +6,7 @@
 
 #include "common/case/problem.hpp"
 #include "common/result/record.hpp"
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule::axisym {
 
@@ -19,6 +19,6 @@ void check_restart(const Record& record);
 // Tubes in gradient flow are computed as graphs r(z), from the beginning as curves if one overhangs; all else as
 // curves. Runs the case, from `restart` (a frame or checkpoint of the same case) if given. What the physics or the
 // numerics do is reported in the summary, never thrown; an unusable initial shape throws std::runtime_error.
-RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart = nullptr);
+RunSummary run_profile(const Problem& c, RunObserver& observer, const Restart* restart = nullptr);
 
 }  // namespace tubule::axisym

@@ -1,4 +1,4 @@
-#include "axisym/run.hpp"
+#include "axisym/run_profile.hpp"
 
 #include "axisym/curve/coarser_curve.hpp"
 #include "axisym/curve/curve_run.hpp"
@@ -18,7 +18,7 @@ void check_restart(const Record& record) {
         graph_restart(record);
 }
 
-RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart) {
+RunSummary run_profile(const Problem& c, RunObserver& observer, const Restart* restart) {
     const Record* from = restart ? &restart->record : nullptr;
     if (c.unknowns != Unknowns::graph || (from && kind_of(*from) == RecordKind::curve))
         return run_curve(c, observer, from);

@@ -1,4 +1,4 @@
-#include "surface3d/run/run.hpp"
+#include "surface3d/run/single_surface.hpp"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,6 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/run/guards.hpp"
 #include "surface3d/run/mesh_record.hpp"
-#include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_start.hpp"
 
 namespace tubule::surface3d {
@@ -221,36 +220,37 @@ std::unique_ptr<MeshSequence> meshes_of(const Problem& c, const Start& start) {
     return std::make_unique<MoreAndMore>(c, start);
 }
 
-struct RestRow {
+struct SingleRow {
     const Measured& m;
     const Observables& o;
     const CurvedMesh& mesh;
     double energy_error, wall_seconds;
 };
 
-SeriesTable<RestRow> rest_series(const Problem& c) {
-    SeriesTable<RestRow> table;
+SeriesTable<SingleRow> single_series(const Problem& c) {
+    SeriesTable<SingleRow> table;
     table.add({
-        {"time", [](const RestRow&) { return 0.0; }},
-        {"energy", [](const RestRow& r) { return r.o.energy; }},
+        {"time", [](const SingleRow&) { return 0.0; }},
+        {"energy", [](const SingleRow& r) { return r.o.energy; }},
     });
     table.add_family("energy_<kl>", term_names(c.energy),
-                     [](const RestRow& r, std::size_t term) { return r.o.energy_term[term]; });
-    if (c.energy.kg > 0) table.add({{"energy_kg", [](const RestRow& r) { return r.o.energy_kg; }}});
+                     [](const SingleRow& r, std::size_t term) { return r.o.energy_term[term]; });
+    if (c.energy.kg > 0) table.add({{"energy_kg", [](const SingleRow& r) { return r.o.energy_kg; }}});
     if (c.energy.alpha)
-        table.add({{"energy_alpha", [](const RestRow& r) { return r.o.energy_alpha; }},
-                   {"M", [](const RestRow& r) { return r.o.M; }}});
+        table.add({{"energy_alpha", [](const SingleRow& r) { return r.o.energy_alpha; }},
+                   {"M", [](const SingleRow& r) { return r.o.M; }}});
     table.add({
-        {"area", [](const RestRow& r) { return r.o.area; }},
-        {"volume", [](const RestRow& r) { return r.o.volume; }},
-        {"integral_H2", [](const RestRow& r) { return r.o.integral_H2; }},
-        {"integral_K", [](const RestRow& r) { return r.o.integral_K; }},
-        {"gauss_bonnet_defect", [](const RestRow& r) { return gauss_bonnet_defect(r.o, r.mesh); }},
-        {"quality", [](const RestRow& r) { return r.m.quality.worst; }},
-        {"energy_error", [](const RestRow& r) { return r.energy_error; }},
-        {"elements", [](const RestRow& r) { return static_cast<double>(r.mesh.triangles()); }},
-        {"mesh_width", [](const RestRow& r) { return std::sqrt(r.o.area / r.mesh.triangles() * 4 / std::sqrt(3.0)); }},
-        {"wall_seconds", [](const RestRow& r) { return r.wall_seconds; }},
+        {"area", [](const SingleRow& r) { return r.o.area; }},
+        {"volume", [](const SingleRow& r) { return r.o.volume; }},
+        {"integral_H2", [](const SingleRow& r) { return r.o.integral_H2; }},
+        {"integral_K", [](const SingleRow& r) { return r.o.integral_K; }},
+        {"gauss_bonnet_defect", [](const SingleRow& r) { return gauss_bonnet_defect(r.o, r.mesh); }},
+        {"quality", [](const SingleRow& r) { return r.m.quality.worst; }},
+        {"energy_error", [](const SingleRow& r) { return r.energy_error; }},
+        {"elements", [](const SingleRow& r) { return static_cast<double>(r.mesh.triangles()); }},
+        {"mesh_width",
+         [](const SingleRow& r) { return std::sqrt(r.o.area / r.mesh.triangles() * 4 / std::sqrt(3.0)); }},
+        {"wall_seconds", [](const SingleRow& r) { return r.wall_seconds; }},
     });
     return table;
 }
@@ -273,48 +273,20 @@ Record frame(const Problem& c, const Measured& m, std::size_t mesh_number) {
 
 }  // namespace
 
-std::vector<std::string> series_names(const Problem& c) {
-    if (c.moves()) return motion_series(c).names();
-    return rest_series(c).names();
+std::vector<std::string> single_series_names(const Problem& c) {
+    return single_series(c).names();
 }
 
-RunSummary run(const Problem& c, RunObserver& observer, const Restart* restart) {
-    return run(c, Start(c), observer, restart);
-}
-
-namespace {
-
-// For a surface that brings its own triangles: advice in the keys that it has.
-void advise_given_triangles(const Problem& c, std::string& advice) {
-    const auto* file = std::get_if<MeshFile>(&c.shape);
-    const std::string more = !file          ? "begin with a frame of more triangles"
-                             : file->remesh ? "set a larger shape.remesh"
-                                            : "set shape.remesh, or give the file more triangles";
-    for (const auto& [words, instead] : {std::pair<std::string, std::string>{"use more elements", more},
-                                         {"try another discretisation.elements or", "try another"},
-                                         {", or discretisation.mesh = \"graded\"", ""}})
-        if (const auto at = advice.find(words); at != advice.npos) advice.replace(at, words.size(), instead);
-}
-
-RunSummary run_any(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
-    if (c.moves()) return run_motion(c, start, observer, restart);
+RunSummary run_single(const Problem& c, const Start& start, RunObserver& observer) {
     const RunClock clock(c.time, observer);
     const auto meshes = meshes_of(c, start);
     RunSummary s = clock.pausing([&] { return drive(c, observer, clock, *meshes); });
     if (!meshes->measured()) return s;
     const Measured& m = *meshes->measured();
     if (m.has_curvature())
-        observer.row(rest_series(c).values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
+        observer.row(single_series(c).values({m, m.o, m.start.mesh, meshes->error(), clock.seconds()}));
     const std::size_t mesh_number = observer.mesh(cells_of(m.start.mesh));
     observer.frame([&] { return frame(c, m, mesh_number); });
-    return s;
-}
-
-}  // namespace
-
-RunSummary run(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
-    RunSummary s = run_any(c, start, observer, restart);
-    if (!start.resizable()) advise_given_triangles(c, s.stop.advice);
     return s;
 }
 
