@@ -130,8 +130,8 @@ Energetics GraphSimulation::energetics() const {
     return {.bending = o.energy,
             .free_energy = o.free_energy,
             .total = o.free_energy,
-            .start = past_.energy_start,
-            .least = good_.least_energy,
+            .total_start = past_.energy_start,
+            .total_least = good_.least_energy,
             .dissipation = o.dissipation,
             .area = o.area};
 }

@@ -109,7 +109,7 @@ void Loop::finish() {
     if (!run_.has_state()) return;
     const Energetics e = run_.energetics();
     summary.energy = e.bending;
-    if (auto doubt = doubt_after(case_, stop_->reason, e.start, e.total, summary.reference_energy); !doubt.empty())
+    if (auto doubt = doubt_after(case_, stop_->reason, e.total_start, e.total, summary.reference_energy); !doubt.empty())
         summary.warnings.push_back(std::move(doubt));
     if (out_.wants_row(run_.time())) write_row(*run_.at(run_.time()), run_.time());
     out_.end(*stop_, run_.time(), [this] { return restart_record(); });

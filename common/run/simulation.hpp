@@ -13,10 +13,10 @@
 
 namespace tubule {
 
-// Energies and rates at the end of the last step. `total` can only fall: the free energy with the kinetic energy, less
-// the work of loads that change; `start` and `least` are its initial and least values so far.
+// Energies and rates at the end of the last step. total = F + kinetic energy - work of changing loads; it never rises.
+// total_start, total_least: its first and least value.
 struct Energetics {
-    double bending = 0, free_energy = 0, total = 0, start = 0, least = 0;
+    double bending = 0, free_energy = 0, total = 0, total_start = 0, total_least = 0;
     double kinetic = 0, dissipation = 0;
     double acceleration = 0;  // at least the kinetic energy gained from rest, per time squared
     double area = 0;

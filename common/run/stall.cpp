@@ -11,7 +11,7 @@ constexpr double least_fall = 0.1;       // fall of the energy that does, relati
 }  // namespace
 
 std::optional<StopReport> Stall::after_step(const Simulation& run) {
-    return look(run.time(), run.step_size(), run.energetics().least / run.summary.reference_energy);
+    return look(run.time(), run.step_size(), run.energetics().total_least / run.summary.reference_energy);
 }
 
 std::optional<StopReport> Stall::look(double time, double step, double least) {

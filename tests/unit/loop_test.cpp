@@ -48,8 +48,8 @@ public:
         return {.bending = x * x,
                 .free_energy = x * x,
                 .total = x * x,
-                .start = 1,
-                .least = x * x,
+                .total_start = 1,
+                .total_least = x * x,
                 .dissipation = 2 * x * x,
                 .area = 1};
     }
