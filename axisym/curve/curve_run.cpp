@@ -58,12 +58,7 @@ public:
             run_->resume(*restart);
         else
             run_->begin();
-        Loop loop = loop_of(*run_, case_, watch_, clock_);
-        if (restart)
-            loop.resume(*restart);
-        else
-            loop.begin(start_.note);
-        loop.go();
+        loop_of(*run_, case_, watch_, clock_).go_from(restart, start_.note);
         // Only ends that are alike can be compared.
         if (!can_go_on(run_->summary.stop.reason)) coarser_->lead_to(HUGE_VAL);
         judge();
@@ -137,11 +132,7 @@ private:
 }  // namespace
 
 RunSummary run_curve(const Problem& c, RunObserver& observer, const Record* restart) {
-    const RunClock clock(c.time, observer);
-    return clock.pausing([&] {
-        CurveRuns runs(c, observer, clock, restart);
-        return drive(c, observer, clock, runs);
-    });
+    return drive_runs<CurveRuns>(c, observer, restart);
 }
 
 }  // namespace tubule::axisym

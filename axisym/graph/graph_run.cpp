@@ -40,12 +40,7 @@ public:
         else
             run_.emplace(case_, clock_, settings_);
         run_->summary.attempts = count_;
-        Loop loop(*run_, case_, watch_, clock_);
-        if (restart)
-            loop.resume(*restart);
-        else
-            loop.begin();
-        loop.go();
+        Loop(*run_, case_, watch_, clock_).go_from(restart);
         if (!fallback_.empty()) run_->summary.warnings.push_back(fallback_);
         return run_->summary;
     }
@@ -88,11 +83,7 @@ private:
 }  // namespace
 
 RunSummary run_graph(const Problem& c, RunObserver& observer, const Record* restart) {
-    const RunClock clock(c.time, observer);
-    return clock.pausing([&] {
-        GraphRuns runs(c, observer, clock, restart);
-        return drive(c, observer, clock, runs);
-    });
+    return drive_runs<GraphRuns>(c, observer, restart);
 }
 
 }  // namespace tubule::axisym

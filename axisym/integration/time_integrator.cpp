@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/run/run.hpp"
+#include "common/run/run_observer.hpp"
 
 namespace tubule::axisym {
 

@@ -32,4 +32,14 @@ public:
 // as it should, but less accurate than asked, has a warning if the case fixes how fine it is, else it is a failure.
 RunSummary& drive(const Problem& c, RunObserver& watch, const RunClock& clock, EstimatedRuns& runs);
 
+// As drive(), of Runs(c, watch, clock, more...). Where making them or their first state pauses, the summary says so.
+template <class Runs, class... More>
+RunSummary drive_runs(const Problem& c, RunObserver& watch, const More&... more) {
+    const RunClock clock(c.time, watch);
+    return clock.pausing([&]() -> RunSummary {
+        Runs runs(c, watch, clock, more...);
+        return drive(c, watch, clock, runs);
+    });
+}
+
 }  // namespace tubule

@@ -37,6 +37,14 @@ void Loop::go() {
     finish();
 }
 
+void Loop::go_from(const Record* restart, const std::string& note) {
+    if (restart)
+        resume(*restart);
+    else
+        begin(note);
+    go();
+}
+
 void Loop::step(double until) try {
     const double from = run_.time();
     until = std::min({until, case_.time.end, run_.lands_on_outputs() ? outputs_.next() : HUGE_VAL});
@@ -109,7 +117,8 @@ void Loop::finish() {
     if (!run_.has_state()) return;
     const Energetics e = run_.energetics();
     summary.energy = e.bending;
-    if (auto doubt = doubt_after(case_, stop_->reason, e.total_start, e.total, summary.reference_energy); !doubt.empty())
+    if (auto doubt = doubt_after(case_, stop_->reason, e.total_start, e.total, summary.reference_energy);
+        !doubt.empty())
         summary.warnings.push_back(std::move(doubt));
     if (out_.wants_row(run_.time())) write_row(*run_.at(run_.time()), run_.time());
     out_.end(*stop_, run_.time(), [this] { return restart_record(); });

@@ -25,6 +25,7 @@ public:
     void begin(const std::string& note = "");
     void resume(const Record& restart);
     void go();
+    void go_from(const Record* restart, const std::string& note = "");  // begin() or resume(), and go()
     void step(double until = HUGE_VAL);
     void end(const StopReport& stop) { stop_ = stop; }  // there are no more steps
 

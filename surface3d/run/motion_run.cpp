@@ -22,11 +22,11 @@ bool ended_by_physics(const StopReport& stop) {
 
 class MotionRuns : public EstimatedRuns {
 public:
-    MotionRuns(const Problem& c, const Start& start, RunObserver& watch, const RunClock& clock, const Restart* restart)
+    MotionRuns(const Problem& c, RunObserver& watch, const RunClock& clock, const Start& start, const Restart* restart)
         : case_(c),
-          start_(start),
           watch_(watch),
           clock_(clock),
+          start_(start),
           restart_(restart),
           settings_(restart ? motion_restart(restart->record, c.scheme).memory.settings : first_settings(c, start)) {}
 
@@ -39,12 +39,7 @@ public:
             run.resume(*restart, start_);
         else
             run.begin(start_);
-        Loop loop = loop_of(run, case_, watch_, clock_);
-        if (restart)
-            loop.resume(restart->record);
-        else
-            loop.begin();
-        loop.go();
+        loop_of(run, case_, watch_, clock_).go_from(restart ? &restart->record : nullptr);
         const MotionMemory& memory = run.memory();
         ended_ = {std::move(run.summary), {memory.error, error.in_time(), error.spare() * memory.balance.defect}};
         judge(error.stop());
@@ -86,9 +81,9 @@ private:
     }
 
     const Problem& case_;
-    const Start& start_;
     RunObserver& watch_;
     const RunClock& clock_;
+    const Start& start_;
     const Restart* restart_;  // until a run has resumed from it
     MotionSettings settings_;
     Ended ended_;
@@ -102,11 +97,7 @@ void check_restart(const Problem& c, const Record& record) {
 }
 
 RunSummary run_motion(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {
-    const RunClock clock(c.time, observer);
-    return clock.pausing([&] {
-        MotionRuns runs(c, start, observer, clock, restart);
-        return drive(c, observer, clock, runs);
-    });
+    return drive_runs<MotionRuns>(c, observer, start, restart);
 }
 
 }  // namespace tubule::surface3d
