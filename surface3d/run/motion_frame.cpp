@@ -38,7 +38,8 @@ void memory_fields(Fields&& f, Memory& m) {
     f.number("restart_dissipation_past", m.balance.dissipation_past), f.number("restart_moved", m.moved);
     f.number("restart_steps", m.count.steps), f.number("restart_rejected", m.count.rejected);
     f.number("restart_mesh_since", m.count.mesh_since), f.number("restart_meshes", m.count.meshes);
-    f.number("restart_coarser", m.count.thinned), f.number("restart_grid", m.grid);
+    f.number("restart_coarser", m.count.thinned);  // meshes of fewer triangles, on the way
+    f.number("restart_grid", m.initial_mesh_of);
     f.number("restart_rough", m.count.rough), f.number("restart_linear_solves", m.linear_work.solves);
     f.number("restart_gmres_iterations", m.linear_work.iterations), f.number("restart_lu_solves", m.linear_work.lu);
 }

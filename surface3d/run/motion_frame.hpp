@@ -51,11 +51,11 @@ struct MotionMemory {
     MotionBalance balance;
     MotionCounters count;
     double next_step = 0;
-    int order = 1;       // of the last step, in time
-    int grid = 0;        // the mesh is the initial one of this number of triangles; 0: another one
-    double error = 0;    // largest so far, of the energy, absolute
-    double moved = 0;    // largest path of a node since the last check for self-intersection
-    Eigen::VectorXd H0;  // at the nodes, where it varies
+    int order = 1;            // of the last step, in time
+    int initial_mesh_of = 0;  // the mesh is the initial one of so many triangles; 0: remeshed
+    double error = 0;         // largest so far, of the energy, absolute
+    double moved = 0;         // largest path of a node since the last check for self-intersection
+    Eigen::VectorXd H0;       // at the nodes, where it varies
     LinearWork linear_work;
 };
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/run/driver.hpp"
-#include "surface3d/run/motion_error.hpp"
+#include "surface3d/run/companion_runs.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -31,9 +31,9 @@ public:
           settings_(restart ? motion_restart(restart->record, c.scheme).memory.settings : first_settings(c, start)) {}
 
     RunSummary& next() override {
-        MotionError error(case_, start_, clock_, settings_);
-        if (fixed_by().empty() && can_be_finer(settings_)) error.give_up = beyond_use * case_.accuracy.energy;
-        SurfaceSimulation run(case_, watch_, settings_, case_.accuracy.estimate ? &error : nullptr);
+        CompanionRuns companions(case_, start_, clock_, settings_);
+        if (fixed_by().empty() && can_be_finer(settings_)) companions.give_up = beyond_use * case_.accuracy.energy;
+        SurfaceSimulation run(case_, watch_, settings_, case_.accuracy.estimate ? &companions : nullptr);
         const Restart* restart = std::exchange(restart_, nullptr);
         if (restart)
             run.resume(*restart, start_);
@@ -41,8 +41,9 @@ public:
             run.begin(start_);
         loop_of(run, case_, watch_, clock_).go_from(restart ? &restart->record : nullptr);
         const MotionMemory& memory = run.memory();
-        ended_ = {std::move(run.summary), {memory.error, error.in_time(), error.spare() * memory.balance.defect}};
-        judge(error.stop());
+        ended_ = {std::move(run.summary),
+                  {memory.error, companions.in_time(), companions.spare() * memory.balance.defect}};
+        judge(companions.stop());
         return ended_.summary;
     }
 
@@ -65,16 +66,17 @@ private:
         MotionErrors errors;
     };
 
-    // The stated error: unknown where the coarser run ended earlier, unless physics ended both for the same reason.
-    void judge(const std::optional<StopReport>& coarser) {
+    // The stated error: unknown where a companion ended earlier, unless physics ended both for the same reason.
+    void judge(const std::optional<StopReport>& companion) {
         RunSummary& s = ended_.summary;
-        const bool paused = coarser && can_go_on(coarser->reason);
-        const bool known = case_.accuracy.estimate && (!coarser || coarser->time >= s.stop.time * (1 - 1e-3));
-        const bool together = coarser && ended_by_physics(s.stop) && s.stop.reason == coarser->reason;
-        if (coarser && !paused && !known && !together)
-            s.warnings.push_back(fmt::format(
-                "the coarser run beside it ended at t = {:.6g} with {}{}: the error after that is unknown",
-                coarser->time, name(coarser->reason), coarser->message.empty() ? "" : " (" + coarser->message + ")"));
+        const bool paused = companion && can_go_on(companion->reason);
+        const bool known = case_.accuracy.estimate && (!companion || companion->time >= s.stop.time * (1 - 1e-3));
+        const bool together = companion && ended_by_physics(s.stop) && s.stop.reason == companion->reason;
+        if (companion && !paused && !known && !together)
+            s.warnings.push_back(
+                fmt::format("the coarser run beside it ended at t = {:.6g} with {}{}: the error after that is unknown",
+                            companion->time, name(companion->reason),
+                            companion->message.empty() ? "" : " (" + companion->message + ")"));
         if (!known && !together) ended_.errors.energy = s.reference_energy;
         const double error = std::max(ended_.errors.energy, ended_.errors.defect);
         s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;
@@ -93,7 +95,7 @@ private:
 
 void check_restart(const Problem& c, const Record& record) {
     motion_restart(record, c.scheme);
-    if (c.accuracy.estimate) check_error_restart(c, record);
+    if (c.accuracy.estimate) check_companions(c, record);
 }
 
 RunSummary run_motion(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart) {

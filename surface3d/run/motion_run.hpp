@@ -14,7 +14,7 @@ namespace tubule::surface3d {
 // Throws std::runtime_error if a run cannot resume from the record.
 void check_restart(const Problem& c, const Record& record);
 
-// A coarser run follows each run, to estimate its error (MotionError). Runs become finer until the energy is as
+// Companions go along with each run, to estimate its error (CompanionRuns). Runs become finer until the energy is as
 // accurate as asked at all times.
 RunSummary run_motion(const Problem& c, const Start& start, RunObserver& observer, const Restart* restart);
 

@@ -11,7 +11,7 @@ namespace {
 // Measured choices: docs/decisions/surface_motion.md, "How large is the error of a surface in motion?".
 constexpr int most_pairs = 6;
 constexpr int first_triangles = 180, most_first_triangles = 1000, most_triangles = 40000;
-constexpr double fewer = 2.25;                         // times fewer triangles of the coarser run
+constexpr double fewer = 2.25;                         // times fewer triangles of a companion
 constexpr double smooth_order = 4, rough_order = 2;    // of errors in the mesh width
 constexpr double per_smoothness = 2.1;                 // order, for each order of interpolation of H
 constexpr double least_growth = 1.5, most_growth = 4;  // of the number of triangles, from pair to pair
@@ -22,7 +22,7 @@ constexpr double later = 2;                            // errors grow from the i
 constexpr double tolerance_per_accuracy = 0.8;         // tolerance = this * asked accuracy^1.5, of order 2
 constexpr double tolerance_of_order_4 = 0.2;           // tolerance = this * asked accuracy^1.25
 constexpr double loosest_tolerance = 1e-4;             // beyond it steps are too long to be compared
-constexpr double loosest_of_coarser = 2e-3;            // beyond it they leave waves that no mesh resolves
+constexpr double loosest_of_companion = 2e-3;          // beyond it they leave waves that no mesh resolves
 constexpr double least_fewer = 1.1;
 constexpr double spare_at_places = 0.85;                  // of the coarsest mesh at walls and beads: the surface moves
 constexpr double rough_below = 0.5, rough_missed = 0.03;  // order and error of H, linear between nodes, at kinks
@@ -31,7 +31,7 @@ constexpr double spare_in_time = 1.25;                    // at most 1.1 of the 
 constexpr double unresolved_waves = 1.6;                  // of rough fluids: at most 1.37 was seen to be missing
 constexpr double between_compared = 1.25;  // of other fluids, whose errors have maxima between the steps compared
 constexpr double sped_up = 2;              // times the least dissipation: the motion has left what it rested at
-constexpr double least_more_steps = 1.5;   // of the run, than of the coarser one: fewer would tell nothing
+constexpr double least_more_steps = 1.5;   // of the run, than of its companion: fewer would tell nothing
 constexpr double surest_growth = 4.5;      // of errors: they have maxima between the steps that are compared
 
 double tolerance_for(const Problem& c) {
@@ -41,9 +41,9 @@ double tolerance_for(const Problem& c) {
     return std::clamp(tolerance, 1e-13, loosest_tolerance);
 }
 
-// Factor of errors from a mesh to the coarser one; elements of one order less count as a mesh.
-double growth_in_space(const MotionSettings& coarser, double order) {
-    return coarser.role == Role::other_order ? order : std::pow(coarser.coarser_by, order / 2);
+// Factor of errors from a run to its companion; elements of one order less count as a mesh.
+double growth_in_space(const MotionSettings& companion, double order) {
+    return companion.role == Role::other_order ? order : std::pow(companion.coarser_by, order / 2);
 }
 
 double order_in_space(const Problem& c, double smoothness) {
@@ -110,9 +110,9 @@ int fewer_triangles(int triangles) {
     return static_cast<int>(triangles / fewer);
 }
 
-MotionSettings coarser(const MotionSettings& s, Role role, double coarser_by) {
+MotionSettings companion_settings(const MotionSettings& s, Role role, double coarser_by) {
     return {.elements = role == Role::other_order ? s.elements : fewer_triangles(s.elements),
-            .tolerance = std::max(loosest_of_coarser, s.tolerance),
+            .tolerance = std::max(loosest_of_companion, s.tolerance),
             .pair = s.pair,
             .role = role,
             .coarser_by = coarser_by};
@@ -122,7 +122,7 @@ bool is_of_high_order(const Problem& c) {
     return entry(c.scheme).most_order > 2;
 }
 
-double growth_of_coarser(const Problem& c, const Smoothness& start) {
+double growth_of_companion(const Problem& c, const Smoothness& start) {
     const bool rough = c.element_order < 4 || is_rough(start);
     return rough || is_of_high_order(c) ? any_growth : stable_growth;
 }
@@ -132,9 +132,9 @@ double spare_for_waves(const Problem& c, const Smoothness& start) {
     return c.element_order == 4 && is_rough(start) ? unresolved_waves : between_compared;
 }
 
-double error_by_difference(const Problem& c, const MotionSettings& coarser, double smoothness) {
+double error_by_difference(const Problem& c, const MotionSettings& companion, double smoothness) {
     const double in_time = std::pow(steps_at_once, entry(c.scheme).order);
-    return 1 / (std::min({growth_in_space(coarser, order_in_space(c, smoothness)), in_time, surest_growth}) - 1);
+    return 1 / (std::min({growth_in_space(companion, order_in_space(c, smoothness)), in_time, surest_growth}) - 1);
 }
 
 bool has_sped_up(const Problem& c, double fastest, double slowest) {
@@ -142,12 +142,12 @@ bool has_sped_up(const Problem& c, double fastest, double slowest) {
     return law.inertia == 0 && !law.loads_change() && fastest > sped_up * slowest;
 }
 
-double error_by_change(double more_steps) {
-    return 1 / (std::max(more_steps, least_more_steps) - 1);
+double error_by_change(double steps_per_step) {
+    return 1 / (std::max(steps_per_step, least_more_steps) - 1);
 }
 
-double error_in_space(const Problem& c, const MotionSettings& coarser, double smoothness) {
-    return 1 / (growth_in_space(coarser, order_in_space(c, smoothness)) - 1);
+double error_in_space(const Problem& c, const MotionSettings& companion, double smoothness) {
+    return 1 / (growth_in_space(companion, order_in_space(c, smoothness)) - 1);
 }
 
 double error_in_time(int order) {

@@ -12,8 +12,8 @@
 #include "common/solve/pause.hpp"
 #include "surface3d/meshing/remesh.hpp"
 #include "surface3d/meshing/transfer.hpp"
+#include "surface3d/run/companion_runs.hpp"
 #include "surface3d/run/guards.hpp"
-#include "surface3d/run/motion_error.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_start.hpp"
 
@@ -27,11 +27,11 @@ constexpr double growth = 1.6, safety = 0.85;  // of steps
 constexpr double shortest_step = 1e-9;         // of the relaxation time: shorter ones are a failure
 // A new mesh is made below this quality, or where the normal on a neck turns by this from node to node; then none for
 // some steps.
-// Nodes of the coarser run of a pair are farther apart, and normals turn more, by this factor.
+// Nodes of companions are farther apart, and normals turn more, by this factor.
 constexpr double quality_to_remesh = 0.25, turn_to_remesh = 0.5, farther_apart = 1.5;
 constexpr int steps_between_meshes = 20;
 constexpr double finer_at = 0.9;  // of the coarsest mesh at walls and beads
-// Errors of a coarser run over those of the run: with 2.25 times fewer triangles of order 4.
+// Errors of a companion over those of the run: with 2.25 times fewer triangles of order 4.
 constexpr double larger_errors = 5;
 // Coarser meshes once the motion is smooth: steps from try to try, most of them; the largest jump of the energy over
 // the tolerance, the least quality of triangles; the first step there over the one before.
@@ -52,8 +52,8 @@ double integral_over_step(double tau, double before, double rate, double now, do
 }  // namespace
 
 SurfaceSimulation::SurfaceSimulation(const Problem& c, RunObserver& watch, const MotionSettings& settings,
-                                     MotionError* error)
-    : case_(c), watch_(watch), error_(error) {
+                                     CompanionRuns* companions)
+    : case_(c), watch_(watch), companions_(companions) {
     memory_.settings = settings;
     memory_.error = settings.difference;
 }
@@ -78,7 +78,7 @@ void SurfaceSimulation::use_mesh(const CurvedMesh& mesh) {
 
 void SurfaceSimulation::begin(const Start& from) {
     start_ = &from;
-    if (from.resizable()) memory_.grid = memory_.settings.elements;
+    if (from.resizable()) memory_.initial_mesh_of = memory_.settings.elements;
     const StartMesh start = from.mesh(memory_.settings.elements, case_.element_order);
     summary.warnings = from.notes();
     const SurfaceSpace space(start.mesh);
@@ -98,7 +98,7 @@ void SurfaceSimulation::begin(const Start& from) {
     measure_state();
     if (moves && is_reported() && !is_rough(now_.smoothness)) now_.dissipation = initial_dissipation();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
-    if (error_) memory_.error = std::max(memory_.error, error_->begin(summary.elements, now_));
+    if (companions_) memory_.error = std::max(memory_.error, companions_->begin(summary.elements, now_));
     update_error();  // the begin time is compared, too
     error_now_ = std::max(error_now_, memory_.error);
 }
@@ -161,7 +161,7 @@ void SurfaceSimulation::resume(const Restart& restart, const Start& start) {
     use_mesh(frame_surface(restart.record, restart.cells.value()));
     state_ = std::move(state);
     measure_state();
-    if (error_) error_->resume(restart.record, summary.elements);
+    if (companions_) companions_->resume(restart.record, summary.elements);
 }
 
 // Why the initial shape is not valid.
@@ -323,25 +323,27 @@ void SurfaceSimulation::make_new_mesh() {
     const auto* better = std::get_if<Remeshed>(&found);
     if (!better || (better->quality.worst < now_.quality.worst && !is_coarse())) return;
     if (!change_mesh(better->mesh, better->fields, HUGE_VAL)) return;
-    memory_.grid = 0;
+    memory_.initial_mesh_of = 0;
     memory_.next_step = first_step_from(std::min(memory_.next_step, first_step * memory_.scale.relaxation));
 }
 
-// Where the coarser run can follow, which is where it has got to the same time.
+// Where companions can take fewer triangles, too: where they have got to the same time.
 bool SurfaceSimulation::may_be_thinned() const {
     if (!case_.surface.coarsen || !is_reported() || memory_.count.thinned == most_thinned) return false;
-    const int since = memory_.count.steps - memory_.count.mesh_since, next = fewer_triangles(memory_.grid);
+    const int since = memory_.count.steps - memory_.count.mesh_since, next = fewer_triangles(memory_.initial_mesh_of);
     if (since < steps_between_meshes || memory_.count.steps % steps_between_looks != 0) return false;
-    return error_ ? fewer_triangles(next) >= least_triangles && error_->is_at(state_.time) : next >= least_triangles;
+    return companions_ ? fewer_triangles(next) >= least_triangles && companions_->is_at(state_.time)
+                       : next >= least_triangles;
 }
 
 // Takes the mesh of about `triangles` of the initial shape, with its nodes where the same points are now. False where
 // that is not a good mesh, or the energy would jump by more than `most_jump`, absolutely.
 bool SurfaceSimulation::thin_to(int triangles, double most_jump) {
-    if (memory_.grid == 0) return false;
+    if (memory_.initial_mesh_of == 0) return false;
     const int order = case_.element_order;
     try {
-        const CurvedMesh from = start_->mesh(memory_.grid, order).mesh, to = start_->mesh(triangles, order).mesh;
+        const CurvedMesh from = start_->mesh(memory_.initial_mesh_of, order).mesh,
+                         to = start_->mesh(triangles, order).mesh;
         if (to.triangles() >= from.triangles()) return false;
         const std::vector<MeshPoint> places = places_of_nodes(to, from);
         const CurvedMesh now = surface().mesh(state_), next = moved_to(places, now, to);
@@ -351,7 +353,7 @@ bool SurfaceSimulation::thin_to(int triangles, double most_jump) {
     } catch (const SolveError&) {
         return false;
     }
-    memory_.grid = triangles;
+    memory_.initial_mesh_of = triangles;
     memory_.count.mesh_since = memory_.count.steps;
     ++memory_.count.thinned;
     memory_.next_step = first_step_from(shorter_first_step * memory_.next_step);
@@ -360,12 +362,12 @@ bool SurfaceSimulation::thin_to(int triangles, double most_jump) {
 
 void SurfaceSimulation::look_for_thinner() {
     const double most = part_of_jump * case_.accuracy.energy * memory_.scale.reference_energy;
-    if (!thin_to(fewer_triangles(memory_.grid), most)) return;
+    if (!thin_to(fewer_triangles(memory_.initial_mesh_of), most)) return;
     watch_.note(fmt::format("t = {:.4g}: continues with {} triangles", state_.time, summary.elements));
-    if (error_) error_->thinned(memory_.grid, summary.elements);
+    if (companions_) companions_->thinned(memory_.initial_mesh_of, summary.elements);
 }
 
-std::optional<StopReport> SurfaceSimulation::follow_with(int triangles, int of_run) {
+std::optional<StopReport> SurfaceSimulation::take_thinner_mesh(int triangles, int of_run) {
     if (!thin_to(triangles, HUGE_VAL))
         return StopReport{Stop::resolution_lost, state_.time,
                           fmt::format("there is no mesh of {} triangles", triangles), ""};
@@ -443,7 +445,7 @@ std::optional<StopReport> SurfaceSimulation::find_event(bool at_output) {
 }
 
 std::optional<StopReport> SurfaceSimulation::check_error() {
-    if (!error_ || memory_.error <= error_->give_up * memory_.scale.reference_energy) return std::nullopt;
+    if (!companions_ || memory_.error <= companions_->give_up * memory_.scale.reference_energy) return std::nullopt;
     // Not shown: a finer run replaces this one.
     return StopReport{Stop::resolution_lost, state_.time, "far less accurate than asked for, already", ""};
 }
@@ -513,9 +515,10 @@ std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
 std::optional<StopReport> SurfaceSimulation::update_error() {
     if (!is_reported()) return std::nullopt;
     std::optional<double> error;
-    if (error_)
-        error = error_->follow_to(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
-    const double rise = total() - memory_.balance.lowest_total, spare = error_ ? error_->spare() : 1,
+    if (companions_)
+        error =
+            companions_->compare_at(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
+    const double rise = total() - memory_.balance.lowest_total, spare = companions_ ? companions_->spare() : 1,
                  defect = spare * std::abs(memory_.balance.defect_at(total()));
     if (error) memory_.error = std::max({memory_.error, *error, rise});
     error_now_ = std::max(error ? memory_.error : memory_.scale.reference_energy, defect);
@@ -551,7 +554,7 @@ public:
     Record record() const override {
         const std::size_t mesh = run_.watch_.mesh(cells_of(run_.mesh()));
         Record out = motion_record(run_.surface(), run_.state_, run_.now_, run_.memory_, mesh);
-        if (run_.error_) run_.error_->save(out);
+        if (run_.companions_) run_.companions_->save(out);
         return out;
     }
 

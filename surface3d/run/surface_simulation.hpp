@@ -18,7 +18,7 @@
 
 namespace tubule::surface3d {
 
-class MotionError;
+class CompanionRuns;
 
 // Whether t is before the other time by more than rounding.
 inline bool is_before(double t, double other) {
@@ -28,9 +28,9 @@ inline bool is_before(double t, double other) {
 // Many fields: what it is given, its state, and what it remembers.
 class SurfaceSimulation : public Simulation {
 public:
-    // All references must outlive it, and the start of begin() or resume(), of which one comes first. `error` tells
-    // that of the run; none where it is not to be known.
-    SurfaceSimulation(const Problem& c, RunObserver& watch, const MotionSettings& settings, MotionError* error);
+    // All references must outlive it, and the start of begin() or resume(), of which one comes first. `companions`
+    // give the error of the run; none where it is not to be known.
+    SurfaceSimulation(const Problem& c, RunObserver& watch, const MotionSettings& settings, CompanionRuns* companions);
     void begin(const Start& start);
     void resume(const Restart& restart, const Start& start);
 
@@ -59,10 +59,10 @@ public:
     CurvedMesh mesh() const { return surface().mesh(state_); }
     double shortest_usual_step() const;  // a run of shorter ones may have stalled
 
-    // For coarser runs that follow: the length of the next step; a mesh of about `triangles` beside a run that has
-    // `of_run` of them now, or why there is none.
+    // For companions: the length of the next step; a mesh of about `triangles` beside a run that has `of_run` of them
+    // now, or why there is none.
     void set_next_step(double tau) { memory_.next_step = tau; }
-    std::optional<StopReport> follow_with(int triangles, int of_run);
+    std::optional<StopReport> take_thinner_mesh(int triangles, int of_run);
 
 private:
     class View;
@@ -118,7 +118,7 @@ private:
 
     const Problem& case_;
     RunObserver& watch_;
-    MotionError* error_;
+    CompanionRuns* companions_;
     const Start* start_ = nullptr;
     std::unique_ptr<TimeScheme> scheme_;
     MotionState state_;

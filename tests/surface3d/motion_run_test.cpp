@@ -13,7 +13,7 @@
 #include "common/run/energy_trace.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
-#include "surface3d/run/coarser_run.hpp"
+#include "surface3d/run/companion_runs.hpp"
 #include "surface3d/run/motion_frame.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/run_surface.hpp"
@@ -71,10 +71,10 @@ TEST(MotionRun, EveryModelKeepsWhatItMust) {
     }
 }
 
-TEST(MotionSettings, TheCoarserRunHasFewerTrianglesOrAnotherOrder) {
+TEST(MotionSettings, TheCompanionHasFewerTrianglesOrAnotherOrder) {
     const MotionSettings fine{.elements = 450, .tolerance = 1e-5};
-    EXPECT_EQ(coarser(fine, Role::other_order, 1).elements, fine.elements);
-    EXPECT_LT(coarser(fine, Role::fewer_triangles, 2).elements, fine.elements / 1.5);
+    EXPECT_EQ(companion_settings(fine, Role::other_order, 1).elements, fine.elements);
+    EXPECT_LT(companion_settings(fine, Role::fewer_triangles, 2).elements, fine.elements / 1.5);
 }
 
 TEST(MotionSettings, TheErrorIsAPartOfTheDifferenceByTheOrderOfBoth) {
@@ -82,7 +82,7 @@ TEST(MotionSettings, TheErrorIsAPartOfTheDifferenceByTheOrderOfBoth) {
     // p = 4 where H is smooth, 2 where it is rough; but at most by 3.5.
     const Case c = begin(wavy, {"discretisation.order=4"}).c;
     const auto on_fewer = [](double n) {
-        return coarser({.elements = 400, .tolerance = 1e-7}, Role::fewer_triangles, n);
+        return companion_settings({.elements = 400, .tolerance = 1e-7}, Role::fewer_triangles, n);
     };
     EXPECT_NEAR(error_by_difference(c, on_fewer(2), 2.0), 1.0 / 3, 1e-9);
     EXPECT_NEAR(error_by_difference(c, on_fewer(2), 0.6), 1, 1e-9);
@@ -98,7 +98,7 @@ TEST(MotionSettings, ErrorsOfHighOrderAreToldApart) {
     const Case c = begin(wavy, {"discretisation.order=4", "discretisation.scheme=bdf"}).c;
     EXPECT_TRUE(is_of_high_order(c));
     EXPECT_FALSE(is_of_high_order(begin(wavy, {"discretisation.scheme=bdf2"}).c));
-    const MotionSettings on_fewer = coarser({.elements = 400, .tolerance = 1e-7}, Role::fewer_triangles, 3);
+    const MotionSettings on_fewer = companion_settings({.elements = 400, .tolerance = 1e-7}, Role::fewer_triangles, 3);
     EXPECT_NEAR(error_in_space(c, on_fewer, 2.0), 1.0 / 8, 1e-9);
     EXPECT_NEAR(error_in_time(4), 1.25 / 80, 1e-9);
     EXPECT_NEAR(error_in_time(1), 1.25 / 2, 1e-9);
@@ -111,9 +111,11 @@ Smoothness smoothness_of_start(const std::string& shape, int elements) {
     return smoothness_of(mesh, motion_fields(space, mesh, Projection(space, mesh)).H);
 }
 
-TEST(MotionSettings, TheCoarserRunMakesLongStepsAtOnceOnlyFromRoughStarts) {
+TEST(MotionSettings, TheCompanionMakesLongStepsAtOnceOnlyFromRoughShapes) {
     const Case c = begin(wavy, {"discretisation.order=4"}).c;
-    const auto growth = [&](const std::string& shape) { return growth_of_coarser(c, smoothness_of_start(shape, 180)); };
+    const auto growth = [&](const std::string& shape) {
+        return growth_of_companion(c, smoothness_of_start(shape, 180));
+    };
     // H jumps where the halves of a capsule meet its tube.
     EXPECT_GT(growth("kind = \"capsule\"\nradius = 0.7\nlength = 1.0\n"), 1e6);
     EXPECT_GT(growth("kind = \"capsule\"\nradius = 0.5\nlength = 2.0\n"), 1e6);
@@ -123,7 +125,7 @@ TEST(MotionSettings, TheCoarserRunMakesLongStepsAtOnceOnlyFromRoughStarts) {
     EXPECT_EQ(growth("kind = \"sphere\"\nradius = 1\nmode = [{amplitude = 0.02, l = 2, m = 1}]\n"), 2.4);
     // Steps of order 4 are compared three at once, always.
     const Case bdf = begin(wavy, {"discretisation.order=4", "discretisation.scheme=bdf"}).c;
-    EXPECT_GT(growth_of_coarser(bdf, {.order = 2, .missed = 0}), 1e6);
+    EXPECT_GT(growth_of_companion(bdf, {.order = 2, .missed = 0}), 1e6);
 }
 
 TEST(MotionSettings, RoughFluidsStateMore) {
@@ -406,7 +408,7 @@ TEST(MotionRun, GivenTrianglesDoNotBecomeFewer) {
                  std::exception);
 }
 
-TEST(MotionRunStudy, TheCoarserRunGetsFewerTrianglesToo) {
+TEST(MotionRunStudy, TheCompanionGetsFewerTrianglesToo) {
     // 500 and 180 triangles, then 180 and 80.
     const std::vector<std::string> sets =
         calming({"discretisation.elements=500", "discretisation.order=2", "time.output=[0.045]"});
@@ -449,7 +451,7 @@ TEST(MotionRun, SchemeThatIsNotGivenIsThatOfTheModel) {
     EXPECT_EQ(Problem(begin(wavy, {"model.kind=fluid", "accuracy.energy=1e-5"}).c).scheme, scheme_named("alpha"));
 }
 
-TEST(MotionRunStudy, ACoarserRunMayBeOffByMore) {
+TEST(MotionRunStudy, ACompanionMayBeOffByMore) {
     // cases/surface_fluid_sphere.toml: INT K of the coarser run, of 80 triangles, is off by 1 % from t = .053 on. An
     // error of 1 would be stated if it had ended there.
     const Outcome o = run_case(R"(
@@ -464,12 +466,12 @@ time = {end = 0.06}
     EXPECT_LT(o.summary.estimated_error, 0.1);
 }
 
-TEST(CoarserRun, ACoarserRunThatTakesFarShorterStepsIsLost) {
+TEST(Companion, IsLostIfItTakesFarShorterSteps) {
     Outcome o = begin(wavy, {"model.kind=overdamped"});
     const Start start(o.c);
     const RunClock clock(o.c.time, o.watch);
     const auto got_to = [&](double tolerance) {
-        CoarserRun run(o.c, start, clock, {80, tolerance, 0, 1, Role::fewer_triangles});
+        Companion run(o.c, start, clock, {80, tolerance, 0, 1, Role::fewer_triangles});
         run.begin();
         run.advance_to(1e-3);
         EXPECT_EQ(run.stop().has_value(), tolerance < 1e-6);
@@ -483,12 +485,12 @@ TEST(CoarserRun, ACoarserRunThatTakesFarShorterStepsIsLost) {
     EXPECT_LT(got_to(1e-9), 1e-3);
 }
 
-TEST(CoarserRun, StepsOfACoarserRunGrowEvenlyWithoutInertia) {
+TEST(Companion, StepsGrowEvenlyWithoutInertia) {
     const auto last_step = [](const std::string& kind) {
         Outcome o = begin(wavy, {"model.kind=" + kind});
         const Start start(o.c);
         const RunClock clock(o.c.time, o.watch);
-        CoarserRun run(o.c, start, clock, {80, 1e-2, 0, 1, Role::fewer_triangles});
+        Companion run(o.c, start, clock, {80, 1e-2, 0, 1, Role::fewer_triangles});
         run.begin();
         run.advance_to(1e-5, 2.4);
         EXPECT_EQ(run.steps(), 1);
