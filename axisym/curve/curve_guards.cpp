@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "axisym/curve/curve_measures.hpp"
-#include "common/run/energy_checks.hpp"
+#include "common/run/stops.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -21,28 +21,17 @@ std::span<const CurveGuard> curve_guards() {
     static const CurveGuard list[]{
         {[](const Snapshot& s, double r_min) { return std::isfinite(s.neck.radius) ? s.neck.radius - r_min : 1; },
          [](const Snapshot& s, double time) {
-             return StopReport{Stop::pinch_off, time,
-                               fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", s.neck.radius, s.neck.z),
-                               "lower accuracy.r_min to follow the neck further"};
+             return neck_closed(s.neck.radius, fmt::format("z = {:.6g}", s.neck.z), time);
          }},
         {[](const Snapshot& s, double) { return s.o.symbol; },
-         [](const Snapshot& s, double time) {
-             return StopReport{Stop::ill_posed, time,
-                               fmt::format("the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at s = {:.4g}",
-                                           s.o.s_symbol),
-                               "refinement does not help: the energy does not resist short waves there"};
-         }},
+         [](const Snapshot& s, double time) { return ill_posed(fmt::format("s = {:.4g}", s.o.s_symbol), time); }},
         {[](const Snapshot& s, double) { return s.o.domain.is_small() ? -1 : 1.0; },
          [](const Snapshot& s, double time) {
              return undefined_energy(s.o.domain, time, fmt::format("s = {:.4g}", s.o.domain.place));
          }},
         {[](const Snapshot& s, double) { return s.o.potential.distance; },
          [](const Snapshot& s, double time) {
-             return StopReport{
-                 Stop::undefined, time,
-                 fmt::format("the membrane is behind the wall of a potential near s = {:.4g}",
-                             s.o.potential.s_distance),
-                 "place the initial shape in front of the wall, or choose law = \"9-3\", which nothing passes"};
+             return behind_wall(fmt::format("s = {:.4g}", s.o.potential.s_distance), time);
          }},
         {[](const Snapshot& s, double) { return s.pressure_domain.is_small() ? -1 : 1.0; },
          [](const Snapshot& s, double time) { return undefined_pressure(s.pressure_domain, time); }},
@@ -77,10 +66,8 @@ std::optional<StopReport> find_bad_profile(const CurveSpace& space, const Eigen:
             fmt::format("an element near a bead is {:.2g} times as long as model.bead_width", s.coarse_bead),
             "use a tighter accuracy.energy, or set discretisation.elements; wider beads need fewer elements"};
     if (s.o.coarse > 1)
-        return StopReport{
-            Stop::resolution_lost, time,
-            unresolved_waves(fmt::format("an element near s = {:.4g} is", s.o.s_coarse), s.o.coarse),
-            "use a tighter accuracy.energy, or set discretisation.elements; a larger energy.kg needs fewer elements"};
+        return unresolved_waves(fmt::format("an element near s = {:.4g} is", s.o.s_coarse), s.o.coarse, time,
+                                "use a tighter accuracy.energy, or set discretisation.elements");
     const std::vector<double>& breaks = space.splines().breaks();
     const int e = space.splines().element_at(s.o.s_curvature);
     const double turn = s.o.curvature * s.o.g_max * (breaks[e + 1] - breaks[e]);

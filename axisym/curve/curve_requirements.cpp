@@ -56,7 +56,7 @@ void require_place(const Problem& c, const Curve& shape) {
     const bool walls = std::ranges::any_of(potentials, &Potential::is_wall);
     const bool periodic = tube && shape.length > 0;  // no torus
     if (periodic && !walls) require_tube_fields(c, shape);
-    require_place(c, !(periodic && walls), bending_energy(shape, c.energy).potential, distance);
+    refuse_potentials(c, !(periodic && walls), bending_energy(shape, c.energy).potential, distance);
 }
 
 double bead_distance(const Problem& c, const Curve& shape) {

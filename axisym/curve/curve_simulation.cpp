@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "axisym/curve/coarser_curve.hpp"
-#include "common/run/energy_checks.hpp"
 #include "common/run/stall.hpp"
+#include "common/run/stops.hpp"
 #include "common/solve/sparse.hpp"
 
 namespace tubule::axisym {
@@ -333,11 +333,7 @@ std::optional<StopReport> CurveSimulation::find_rise(const Snapshot& s) {
                  allowed = asked ? std::max(wanted, std::min(error, hopeless)) : hopeless;
     if (!is_admissible(s) || !(rise <= allowed)) {
         restart_integrator();
-        return StopReport{
-            Stop::resolution_lost, past_.time,
-            fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
-                        rise / summary.reference_energy),
-            "use a tighter accuracy.energy; check that the energy resists bending where H = H0"};
+        return energy_rises(rise / summary.reference_energy, past_.time);
     }
     error = std::max(error, rise);
     past_.least = std::min(past_.least, bound);

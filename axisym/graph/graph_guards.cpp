@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/run/energy_checks.hpp"
+#include "common/run/stops.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -19,10 +19,7 @@ std::span<const GraphGuard> graph_guards() {
     static const GraphGuard list[]{
         {[](const Observation& o, const GraphLimits& limits) { return o.r_min - limits.r_min; },
          [](const Observation& o, const GraphMesh& mesh, const double*, double time) {
-             return StopReport{
-                 Stop::pinch_off, time,
-                 fmt::format("the neck radius fell to {:.6g} at z = {:.6g}", o.r_min, mesh.place(o.z_min)),
-                 "lower accuracy.r_min to follow the neck further"};
+             return neck_closed(o.r_min, fmt::format("z = {:.6g}", mesh.place(o.z_min)), time);
          }},
         {[](const Observation& o, const GraphLimits&) { return overhang_steepness - o.steepness; }, overhang},
         {[](const Observation& o, const GraphLimits& limits) { return o.symbol - limits.least_symbol; },
@@ -36,11 +33,8 @@ std::span<const GraphGuard> graph_guards() {
          }},
         {[](const Observation& o, const GraphLimits&) { return 1 - o.coarse; },
          [](const Observation& o, const GraphMesh& mesh, const double*, double time) {
-             return StopReport{
-                 Stop::resolution_lost, time,
-                 unresolved_waves(fmt::format("an element near z = {:.6g} is", mesh.place(o.z_coarse)), o.coarse),
-                 "use a tighter accuracy.energy, or set discretisation.elements; a larger energy.kg needs fewer "
-                 "elements"};
+             return unresolved_waves(fmt::format("an element near z = {:.6g} is", mesh.place(o.z_coarse)), o.coarse,
+                                     time, "use a tighter accuracy.energy, or set discretisation.elements");
          }},
         {[](const Observation& o, const GraphLimits&) { return o.domain.is_small() ? -1 : 1.0; },
          [](const Observation& o, const GraphMesh& mesh, const double*, double time) {

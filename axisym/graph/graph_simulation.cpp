@@ -9,6 +9,7 @@
 #include "axisym/graph/graph_derivatives.hpp"
 #include "axisym/graph/graph_mesh.hpp"
 #include "common/run/energy_checks.hpp"
+#include "common/run/stops.hpp"
 
 namespace tubule::axisym {
 namespace {
@@ -165,10 +166,7 @@ StopReport GraphSimulation::undo_rise(double rise) {
     error_.latest = {rise, 0};
     gave_up = settings_.may_give_up && settings_.free_time;
     return_to_good();
-    return {Stop::resolution_lost, good_.time,
-            fmt::format("the next step raises the energy by {:.2g} of E_ref, but this flow can only lose energy",
-                        rise / summary.reference_energy),
-            "use a tighter accuracy.energy; check that the energy resists bending where H = H0"};
+    return energy_rises(rise / summary.reference_energy, good_.time);
 }
 
 std::optional<StopReport> GraphSimulation::check_error() {

@@ -57,25 +57,6 @@ std::string key_of_ill_posed(const Problem& c) {
     return key.empty() ? "energy" : key;
 }
 
-std::string unresolved_waves(const std::string& what, double times) {
-    return fmt::format(
-        "{} {:.2g} times sqrt(2 kg/|f_HH + 2 f_HK x + f_KK x^2|), the length below "
-        "which only the gradient term damps waves",
-        what, times);
-}
-
-StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where) {
-    return {Stop::undefined, time, fmt::format("a formula is hardly defined any more at {}: {}", where, words(margin)),
-            "choose a formula that is defined for all curvatures and places which the membrane may take"};
-}
-
-StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time) {
-    return {
-        Stop::undefined, time,
-        fmt::format("the pressure is hardly defined any more at the volume {:.6g}: {}", margin.place, words(margin)),
-        "choose a formula for model.pressure that is defined for all volumes which the membrane may enclose"};
-}
-
 void require_pressure(const Problem& c, double volume) {
     if (std::isfinite(loads_at(c.law, 0).energy(0, volume, 0))) return;
     throw complaint(
@@ -85,7 +66,7 @@ void require_pressure(const Problem& c, double volume) {
                     volume));
 }
 
-void require_place(const Problem& c, bool closed, double energy, double distance) {
+void refuse_potentials(const Problem& c, bool closed, double energy, double distance) {
     if (c.energy.potentials.empty()) return;
     const auto refuse = [&](const std::string& what) { throw complaint(c, "energy.potential", what); };
     if (!closed) refuse("needs a closed surface, and the initial shape is a tube");

@@ -1,4 +1,5 @@
-// What is refused, warned of or stops a run because of its energy, and the scale of errors of the energy.
+// What is refused or warned of because of its energy, and the scale of errors of the energy. What stops runs:
+// stops.hpp.
 #pragma once
 
 #include <string>
@@ -15,21 +16,12 @@ CaseError not_defined(const Problem& c, const FormulaDomain::Margin& margin, con
 // The key of the formula; "energy" if there is none.
 std::string key_of_formula(const Bending& energy);
 
-// The message of a guard: `what`, for example "an element near s = 0.3 is", exceeds by the factor `times` the length
-// that resolves the shortest growing wave where kg > 0: theory.md (2.26).
-std::string unresolved_waves(const std::string& what, double times);
-
-// The stop of a run that comes too near to where the formula is not defined.
-StopReport undefined_energy(const FormulaDomain::Margin& margin, double time, const std::string& where);
-
-// Where the pressure is a formula of the volume: the stop of a run that comes too near to where it is not defined, and
-// a CaseError where F, theory.md (3.24), has no value initially.
-StopReport undefined_pressure(const FormulaDomain::Margin& margin, double time);
+// CaseError where F, theory.md (3.24), has no value initially, as the pressure is a formula of the volume.
 void require_pressure(const Problem& c, double volume);
 
 // CaseError where potentials of places do not suit the initial shape: not closed, an energy INT W dS that is not
 // finite, a point behind a wall (`distance` is the least one to a wall).
-void require_place(const Problem& c, bool closed, double energy, double distance);
+void refuse_potentials(const Problem& c, bool closed, double energy, double distance);
 
 // CaseError where beads have no place on the initial shape: none with two poles, or poles that are too near.
 void require_beads(const Problem& c, bool closed, double distance);
@@ -44,11 +36,6 @@ void require_periodic_sources(const Problem& c, double period);
 // The key of what makes an energy ill-posed: the only term whose symbol, theory.md (2.14), can be negative, or
 // "energy". That which the case has: a term of powers may stand for one of the list.
 std::string key_of_ill_posed(const Problem& c);
-
-// Whether a run that failed came near to that.
-inline bool may_be_undefined(const FormulaDomain::Margin& margin) {
-    return margin.value < 0.05;
-}
 
 // E_ref of a run from its initial energy or from (11.1), as the case has it. Throws CaseError where that energy is too
 // small to be a scale, or where the formula of a case has no finite value.

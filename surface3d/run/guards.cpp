@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/geometry/profile_point.hpp"
-#include "common/run/energy_checks.hpp"
+#include "common/run/stops.hpp"
 #include "surface3d/mesh/curved_intersection.hpp"
 
 namespace tubule::surface3d {
@@ -82,21 +82,11 @@ double least_neck(const Problem& c, double area) {
 }
 
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {
-    if (!(m.symbol > 0))
-        return StopReport{Stop::ill_posed, time,
-                          "the principal symbol f_HH + 2 f_HK x + f_KK x^2 reached zero at " + where(m.least_symbol),
-                          "the energy does not resist short waves there; more elements help only if these do not "
-                          "resolve the curvature"};
+    if (!(m.symbol > 0)) return ill_posed(where(m.least_symbol), time);
     if (m.domain.is_small()) return undefined_energy(m, time);
     if (m.pressure_domain.is_small()) return undefined_pressure(m.pressure_domain, time);
-    if (!(m.wall.value > 0))
-        return StopReport{
-            Stop::undefined, time, "the membrane is behind the wall of a potential at " + where(m.wall.where),
-            "place the initial shape in front of the wall, or choose law = \"9-3\", which nothing passes"};
-    if (!(m.neck_radius >= r_min))
-        return StopReport{Stop::pinch_off, time,
-                          fmt::format("the neck radius fell to {:.4g} at {}", m.neck_radius, where(m.narrowest)),
-                          "lower accuracy.r_min to follow the neck further"};
+    if (!(m.wall.value > 0)) return behind_wall(where(m.wall.where), time);
+    if (!(m.neck_radius >= r_min)) return neck_closed(m.neck_radius, where(m.narrowest), time);
     if (!(m.turn.angle <= sharpest_turn)) return find_sharp_turn(m.turn, time);
     if (!(m.quality.worst > worst_quality))
         return StopReport{Stop::mesh_lost, time,
@@ -108,10 +98,8 @@ std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, 
 
 std::optional<StopReport> find_coarse_place(const MotionMeasures& m, double most, double time) {
     if (m.coarse_wave.value > 1)
-        return StopReport{Stop::resolution_lost, time,
-                          unresolved_waves(fmt::format("near {} the distance of nodes is", where(m.coarse_wave.where)),
-                                           m.coarse_wave.value),
-                          "use more elements; a larger energy.kg needs fewer"};
+        return unresolved_waves(fmt::format("near {} the distance of nodes is", where(m.coarse_wave.where)),
+                                m.coarse_wave.value, time, "use more elements");
     const bool at_wall = m.coarse_wall.value >= m.coarse_bead.value;
     const Coarseness& coarse = at_wall ? m.coarse_wall : m.coarse_bead;
     if (!(coarse.value > most)) return std::nullopt;

@@ -8,6 +8,7 @@
 
 #include "common/run/energy_checks.hpp"
 #include "common/run/stall.hpp"
+#include "common/run/stops.hpp"
 #include "common/solve/memory.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/meshing/remesh.hpp"
