@@ -10,26 +10,19 @@
 #include "surface3d/mesh/reference_triangle.hpp"
 
 namespace tubule::surface3d {
+
 namespace {
 
-// Calls visit(X, X_xi, X_eta, weight) at the points of a rule on every cell.
-template <class Visit>
-void for_each_point(const CurvedMesh& mesh, Visit&& visit) {
-    const Tabulation table(mesh.order, quadrature(12));
-    for (int cell = 0; cell < mesh.triangles(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        for (int q = 0; q < table.points(); ++q)
-            visit(Eigen::Vector3d(X * table.value.col(q)), Eigen::Vector3d(X * table.d[0].col(q)),
-                  Eigen::Vector3d(X * table.d[1].col(q)), table.weight[q]);
-    }
-}
+constexpr int mode_degree = 12;  // of the rule for the integrals
 
 }  // namespace
 
 double tube_mode_amplitude(const CurvedMesh& tube, int n, int m) {
     if (!(tube.period > 0)) throw std::invalid_argument("a closed surface has no waves along z");
     std::complex<double> with = 0, against = 0;
-    for_each_point(tube, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {
+    for_each_point(tube, mode_degree, [&](int, const SurfacePoint<double>& p, double weight) {
+        const auto& [X_xi, X_eta] = p.tangent;
+        const Eigen::Vector3d& X = p.x;
         const double r2 = X[0] * X[0] + X[1] * X[1], theta = std::atan2(X[1], X[0]);
         const double theta_xi = (X[0] * X_xi[1] - X[1] * X_xi[0]) / r2,
                      theta_eta = (X[0] * X_eta[1] - X[1] * X_eta[0]) / r2;
@@ -51,15 +44,14 @@ double sphere_mode_amplitude(const CurvedMesh& surface, int l, int m) {
             "a wave of a closed surface must have l >= 2 and 0 <= m <= l; l = 1 is a translation");
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     double area = 0;
-    for_each_point(surface, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {
-        const double dS = weight * X_xi.cross(X_eta).norm();
-        area += dS, middle += dS * X;
+    for_each_point(surface, mode_degree, [&](int, const SurfacePoint<double>& p, double weight) {
+        area += weight * p.area, middle += weight * p.area * p.x;
     });
     middle /= area;
     double mean = 0, re = 0, im = 0;
-    for_each_point(surface, [&](const auto& X, const auto& X_xi, const auto& X_eta, double weight) {
-        const Eigen::Vector3d x = X - middle;
-        const double rho = x.norm(), part = weight * rho * x.dot(X_xi.cross(X_eta)) / (rho * rho * rho);
+    for_each_point(surface, mode_degree, [&](int, const SurfacePoint<double>& p, double weight) {
+        const Eigen::Vector3d x = p.x - middle;
+        const double rho = x.norm(), part = weight * p.area * x.dot(p.normal) / (rho * rho);
         const Eigen::Vector3d at = x / rho;
         mean += part / (4 * pi);
         re += part * real_harmonic(l, m, Vector3<double>(at));

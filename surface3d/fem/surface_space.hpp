@@ -130,6 +130,16 @@ inline SurfacePoint<double> curved_point(const CellColumns<3>& X, const Tabulati
     return p;
 }
 
+// Calls visit(cell, point, weight) at the points of a rule of this degree on all cells; dS = weight point.area.
+template <class Visit>
+void for_each_point(const CurvedMesh& mesh, int degree, const Visit& visit) {
+    const Tabulation table(mesh.order, quadrature(degree));
+    for (int cell = 0; cell < mesh.triangles(); ++cell) {
+        const CellColumns<3> X = cell_nodes(mesh, cell);
+        for (int q = 0; q < table.points(); ++q) visit(cell, tangent_point(X, table, q), table.weight[q]);
+    }
+}
+
 // Root of the mean square of the sides that the cell would have if it were flat and like this all over.
 inline double triangle_width(const SurfacePoint<double>& p) {
     return std::sqrt(2 * (p.metric[0] + p.metric[2] - p.metric[1]) / 3);

@@ -124,7 +124,7 @@ std::string triangle_name(const ImportedMesh& in, std::size_t triangle) {
     if (in.is_new) {
         const auto& [a, b, c] = in.mesh.triangles[triangle];
         const Eigen::Vector3d x = (in.mesh.points[a] + in.mesh.points[b] + in.mesh.points[c]) / 3;
-        return fmt::format("the new triangle at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]);
+        return "the new triangle at " + words_of_place(x, 6);
     }
     const auto& [number, place] = in.source[triangle];
     if (place.line > 0) return fmt::format("triangle {} (line {})", number, place.line);
@@ -133,8 +133,7 @@ std::string triangle_name(const ImportedMesh& in, std::size_t triangle) {
 }
 
 std::string vertex_name(const ImportedMesh& in, int vertex) {
-    const Eigen::Vector3d& x = in.mesh.points[vertex];
-    return fmt::format("vertex {} ({:.6g}, {:.6g}, {:.6g})", in.vertex_number[vertex], x[0], x[1], x[2]);
+    return fmt::format("vertex {} {}", in.vertex_number[vertex], words_of_place(in.mesh.points[vertex], 6));
 }
 
 std::size_t keep_triangles(ImportedMesh& in, const std::vector<bool>& keep) {

@@ -1,11 +1,19 @@
 // A closed (or z-periodic) surface of flat triangles: what curved meshes are made from, and what files hold.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <array>
+#include <string>
 #include <vector>
 
 namespace tubule::surface3d {
+
+// Such as "(0.1, 0, 1)".
+inline std::string words_of_place(const Eigen::Vector3d& x, int digits = 4) {
+    return fmt::format("({:.{}g}, {:.{}g}, {:.{}g})", x[0], digits, x[1], digits, x[2], digits);
+}
 
 struct TriangleMesh {
     std::vector<Eigen::Vector3d> points;

@@ -259,7 +259,7 @@ std::vector<NewNode> new_nodes(const Work& w, const CurvedMesh& mesh, const Tria
 }
 
 StopReport lost(Stop reason, const std::string& what, const Vector3d& x, const std::string& advice) {
-    return {reason, 0, fmt::format("{} at ({:.6g}, {:.6g}, {:.6g})", what, x[0], x[1], x[2]), advice};
+    return {reason, 0, what + " at " + words_of_place(x, 6), advice};
 }
 
 // A triangle that does not face as the surface does.

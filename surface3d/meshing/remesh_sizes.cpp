@@ -36,12 +36,9 @@ void limit_growth(const CurvedMesh& mesh, double growth, Eigen::VectorXd& width)
 }
 
 Eigen::VectorXd areas(const CurvedMesh& mesh) {
-    const Tabulation table(mesh.order, quadrature(2 * mesh.order));
     Eigen::VectorXd area = Eigen::VectorXd::Zero(mesh.triangles());
-    for (int cell = 0; cell < mesh.triangles(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        for (int q = 0; q < table.points(); ++q) area[cell] += table.weight[q] * tangent_point(X, table, q).area;
-    }
+    for_each_point(mesh, 2 * mesh.order,
+                   [&](int cell, const SurfacePoint<double>& p, double weight) { area[cell] += weight * p.area; });
     return area;
 }
 
@@ -87,12 +84,11 @@ MeshSizes mesh_sizes(const CurvedMesh& mesh, const Eigen::VectorXd& H, const Eig
 
     double low = 0, high = largest_over_even * even;
     if (const double needed = count(mesh, area, sizes.width, high); !(needed <= most_over_wanted * wanted)) {
-        const Eigen::Vector3d x = mesh.nodes[narrowest];
-        sizes.lost = StopReport{
-            Stop::resolution_lost, 0,
-            fmt::format("a curvature of {:.3g} at ({:.6g}, {:.6g}, {:.6g}) needs {:.3g} triangles, but {} are allowed",
-                        options.angle / smallest, x[0], x[1], x[2], needed, wanted),
-            "allow more triangles"};
+        sizes.lost =
+            StopReport{Stop::resolution_lost, 0,
+                       fmt::format("a curvature of {:.3g} at {} needs {:.3g} triangles, but {} are allowed",
+                                   options.angle / smallest, words_of_place(mesh.nodes[narrowest], 6), needed, wanted),
+                       "allow more triangles"};
         return sizes;
     } else if (needed < wanted) {
         for (int i = 0; i < 50; ++i) {

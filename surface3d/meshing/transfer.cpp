@@ -43,11 +43,9 @@ std::vector<MeshPoint> places_of_nodes(const CurvedMesh& nodes, const CurvedMesh
     });
     pause.check();
     for (std::size_t i = 0; i < out.size(); ++i)
-        if (out[i].cell < 0) {
-            const Eigen::Vector3d& x = nodes.nodes[i];
-            throw SolveError(fmt::format("a node at ({:.4g}, {:.4g}, {:.4g}) has no place on a mesh of {} triangles",
-                                         x[0], x[1], x[2], on.triangles()));
-        }
+        if (out[i].cell < 0)
+            throw SolveError(fmt::format("a node at {} has no place on a mesh of {} triangles",
+                                         words_of_place(nodes.nodes[i]), on.triangles()));
     return out;
 }
 

@@ -14,11 +14,9 @@ namespace tubule::surface3d {
 
 std::optional<StopReport> find_fold(const MeshQuality& quality) {
     if (quality.worst > 0) return std::nullopt;
-    const Eigen::Vector3d& x = quality.where;
-    return StopReport{
-        Stop::mesh_lost, 0,
-        fmt::format("triangle {} folds at ({:.6g}, {:.6g}, {:.6g})", quality.worst_cell, x[0], x[1], x[2]),
-        "use more elements, or discretisation.mesh = \"graded\""};
+    return StopReport{Stop::mesh_lost, 0,
+                      fmt::format("triangle {} folds at {}", quality.worst_cell, words_of_place(quality.where, 6)),
+                      "use more elements, or discretisation.mesh = \"graded\""};
 }
 
 std::optional<StopReport> find_impossible_curvature(const Observables& o, const CurvedMesh& mesh, double allowed) {
@@ -41,9 +39,7 @@ std::optional<StopReport> find_impossible_curvature(const Observables& o, const 
 std::optional<StopReport> find_self_intersection(const CurvedMesh& mesh) {
     const auto at = first_intersection(mesh);
     if (!at) return std::nullopt;
-    const Eigen::Vector3d& x = *at;
-    return StopReport{Stop::self_intersection, 0,
-                      fmt::format("the surface intersects itself near ({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]),
+    return StopReport{Stop::self_intersection, 0, "the surface intersects itself near " + words_of_place(*at),
                       "contact is not modelled: later results are invalid"};
 }
 
@@ -54,10 +50,6 @@ constexpr double creep = 10;    // increase since its lowest, of the asked accur
 constexpr double climb = 0.25;  // increase of the energy in a step, of the asked accuracy
 constexpr double worst_quality = 0.03, sharpest_turn = 2;
 
-std::string where(const Eigen::Vector3d& x) {
-    return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
-}
-
 // A neck that becomes too thin for its triangles closes; one that is too thin initially may open.
 StopReport find_sharp_turn(const MeshTurn& turn, double time) {
     const bool closes = turn.saddle && time > 0;
@@ -66,14 +58,14 @@ StopReport find_sharp_turn(const MeshTurn& turn, double time) {
                         closes        ? "a neck is closing"
                         : turn.saddle ? "a neck is too thin for the triangles"
                                       : "the surface bends too sharply",
-                        where(turn.where), turn.angle),
+                        words_of_place(turn.where), turn.angle),
             closes ? "use more elements to follow the neck further" : "use more elements"};
 }
 
 }  // namespace
 
 StopReport undefined_energy(const MotionMeasures& m, double time) {
-    return tubule::undefined_energy(m.domain, time, where(m.least_defined));
+    return tubule::undefined_energy(m.domain, time, words_of_place(m.least_defined));
 }
 
 double least_neck(const Problem& c, double area) {
@@ -82,30 +74,30 @@ double least_neck(const Problem& c, double area) {
 }
 
 std::optional<StopReport> find_bad_shape(const MotionMeasures& m, double r_min, double time) {
-    if (!(m.symbol > 0)) return ill_posed(where(m.least_symbol), time);
+    if (!(m.symbol > 0)) return ill_posed(words_of_place(m.least_symbol), time);
     if (m.domain.is_small()) return undefined_energy(m, time);
     if (m.pressure_domain.is_small()) return undefined_pressure(m.pressure_domain, time);
-    if (!(m.wall.value > 0)) return behind_wall(where(m.wall.where), time);
-    if (!(m.neck_radius >= r_min)) return neck_closed(m.neck_radius, where(m.narrowest), time);
+    if (!(m.wall.value > 0)) return behind_wall(words_of_place(m.wall.where), time);
+    if (!(m.neck_radius >= r_min)) return neck_closed(m.neck_radius, words_of_place(m.narrowest), time);
     if (!(m.turn.angle <= sharpest_turn)) return find_sharp_turn(m.turn, time);
     if (!(m.quality.worst > worst_quality))
         return StopReport{Stop::mesh_lost, time,
-                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)", where(m.quality.where),
-                                      m.quality.worst),
+                          fmt::format("a triangle at {} has quality {:.2g} (1: equilateral)",
+                                      words_of_place(m.quality.where), m.quality.worst),
                           "use more elements or a shorter discretisation.relaxation"};
     return std::nullopt;
 }
 
 std::optional<StopReport> find_coarse_place(const MotionMeasures& m, double most, double time) {
     if (m.coarse_wave.value > 1)
-        return unresolved_waves(fmt::format("near {} the distance of nodes is", where(m.coarse_wave.where)),
+        return unresolved_waves(fmt::format("near {} the distance of nodes is", words_of_place(m.coarse_wave.where)),
                                 m.coarse_wave.value, time, "use more elements");
     const bool at_wall = m.coarse_wall.value >= m.coarse_bead.value;
     const Coarseness& coarse = at_wall ? m.coarse_wall : m.coarse_bead;
     if (!(coarse.value > most)) return std::nullopt;
     return StopReport{
         Stop::resolution_lost, time,
-        fmt::format("near {} nodes are {:.2g} times {} apart, and may be {:.2g} times", where(coarse.where),
+        fmt::format("near {} nodes are {:.2g} times {} apart, and may be {:.2g} times", words_of_place(coarse.where),
                     coarse.value, at_wall ? "the range of the wall there" : "model.bead_width", most),
         at_wall ? "use more elements; a longer range needs fewer" : "use more elements; wider beads need fewer"};
 }

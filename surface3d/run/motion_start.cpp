@@ -80,9 +80,7 @@ Eigen::VectorXd start_H0(const Problem& c, const StartMesh& start) {
     const auto at = [&](const Eigen::Vector3d& x) {
         const double value = evaluate(*c.energy.H0_formula, x.data());
         if (!std::isfinite(value))
-            throw complaint(
-                c, "energy.H0",
-                fmt::format("is no number at ({:.4g}, {:.4g}, {:.4g}) of the initial shape", x[0], x[1], x[2]));
+            throw complaint(c, "energy.H0", "is no number at " + words_of_place(x) + " of the initial shape");
         return value;
     };
     Eigen::VectorXd out(mesh.size());
@@ -107,8 +105,7 @@ void require_defined(const Problem& c, const CurvedMesh& mesh, const Eigen::Vect
     if (!domain.restricted()) return;
     for (int i = 0; i < mesh.size(); ++i) domain.look(H0.size() > 0 ? H0[i] : c.energy.H0, H[i], K[i], i);
     const FormulaDomain::Margin margin = domain.margin();
-    const Eigen::Vector3d& x = mesh.nodes[static_cast<std::size_t>(margin.place)];
-    tubule::require_defined(c, margin, fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]));
+    tubule::require_defined(c, margin, words_of_place(mesh.nodes[static_cast<std::size_t>(margin.place)]));
 }
 
 void remember_start(const Problem& c, const StartMesh& start, const SurfaceSpace& space, MotionMemory& memory) {

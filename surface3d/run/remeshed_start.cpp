@@ -48,10 +48,6 @@ constexpr double folded = 120;      // degrees, too
 constexpr double unfolding = 0.33;  // of the length
 constexpr double flattest = 1e-3;   // of the volume of a ball of the same area
 
-std::string place(const Vector3d& x) {
-    return fmt::format("({:.4g}, {:.4g}, {:.4g})", x[0], x[1], x[2]);
-}
-
 // A closed mesh, the volume that its surface should bound, and what was done to make it.
 struct Body {
     std::string name;
@@ -67,7 +63,7 @@ TriangleMesh filled(const ImportedMesh& file, std::vector<std::string>& notes) {
                                     filled.left, filled.left + filled.holes));
     if (filled.holes > 0)
         notes.push_back(fmt::format("{} holes were filled; the longest border, at {}, measures {:.3g}.", filled.holes,
-                                    place(filled.at), filled.longest));
+                                    words_of_place(filled.at), filled.longest));
     return filled.mesh;
 }
 
@@ -174,7 +170,7 @@ void check_crossing(const Body& body, const TriangleMesh& smooth, double length,
     throw MeshError(
         fmt::format("{}: smoothed over {:.3g}, parts of the surface that are far from each other along it "
                     "intersect at {}; move them apart in the file, or shape.wrap = LENGTH joins them",
-                    body.name, length, place(smooth.points[smooth.triangles[pair->first][0]])));
+                    body.name, length, words_of_place(smooth.points[smooth.triangles[pair->first][0]])));
 }
 
 // The curved surface through the vertices of a mesh that is not the file's.
@@ -219,7 +215,8 @@ std::optional<std::string> why_unusable(const CurvedMesh& surface) {
     if (const auto bad = find_impossible_curvature(o, surface, 0.008)) return bad->message;
     const MeshTurn turn = mesh_turn(surface, mesh_quality(surface), fields.H, fields.K);
     if (turn.angle > sharpest_start)
-        return fmt::format("the normal turns by {:.2g} radians from node to node at {}", turn.angle, place(turn.where));
+        return fmt::format("the normal turns by {:.2g} radians from node to node at {}", turn.angle,
+                           words_of_place(turn.where));
     if (const auto met = find_self_intersection(surface)) return met->message;
     return std::nullopt;
 }
@@ -272,7 +269,7 @@ std::string distance_note(const TriangleMesh& file, const TriangleMesh& surface,
     }
     std::string note = fmt::format(
         "The initial shape is at most {:.3g} from the file, {} of its size {:.4g}, at {}; {} rms.", all.distance,
-        percent(all.distance), size, place(all.at), percent(std::sqrt(all.squares / all.area)));
+        percent(all.distance), size, words_of_place(all.at), percent(std::sqrt(all.squares / all.area)));
     if (!creases.triangles.empty())
         note += fmt::format(
             " The file has {} creases (edges kinked by more than {:g} degrees, up to {:.0f}), which are "

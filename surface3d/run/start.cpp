@@ -114,9 +114,7 @@ struct CurveMap {
         if (!curve.velocity) return {};
         const CurvedMesh nodes =
             mapped_mesh(triangles, order, [&](const Eigen::Vector3d& p) { return velocity(curve, base, p); });
-        VectorField out(3, nodes.size());
-        for (int i = 0; i < out.cols(); ++i) out.col(i) = nodes.nodes[i];
-        return out;
+        return node_positions(nodes);
     }
 };
 
@@ -134,9 +132,7 @@ struct ProfileMap : CurveMap {
     Eigen::VectorXd H0(const TriangleMesh& triangles, int order) const {
         const CurvedMesh nodes =
             mapped_mesh(triangles, order, [&](const Eigen::Vector3d& p) { return Eigen::Vector3d(H0_at(p), 0, 0); });
-        Eigen::VectorXd out(nodes.size());
-        for (int i = 0; i < out.size(); ++i) out[i] = nodes.nodes[i].x();
-        return out;
+        return node_positions(nodes).row(0).transpose();
     }
 };
 
@@ -335,9 +331,11 @@ struct Prepare {
             refuse_what_needs_a_shape();
             const CurvedMesh mesh = along_eigenmodes(disturbed(frame_surface(frame, *cells), from), frame, from);
             return {[mesh, moves = velocities(frame, mesh)](int, int order) {
-                        if (mesh.order == order) return StartMesh{mesh, {}, moves ? columns(*moves) : VectorField()};
-                        return StartMesh{
-                            with_order(mesh, order), {}, moves ? columns(with_order(*moves, order)) : VectorField()};
+                        if (mesh.order == order)
+                            return StartMesh{mesh, {}, moves ? node_positions(*moves) : VectorField()};
+                        return StartMesh{with_order(mesh, order),
+                                         {},
+                                         moves ? node_positions(with_order(*moves, order)) : VectorField()};
                     },
                     false};
         }
@@ -416,11 +414,6 @@ struct Prepare {
             out.nodes[i] = Eigen::Map<const Eigen::Vector3d>(u->data.data() + 3 * i);
         return out;
     }
-    static VectorField columns(const CurvedMesh& mesh) {
-        VectorField out(3, mesh.size());
-        for (int i = 0; i < mesh.size(); ++i) out.col(i) = mesh.nodes[i];
-        return out;
-    }
 };
 
 }  // namespace
@@ -451,16 +444,10 @@ struct Moments {
     Eigen::Vector3d first = Eigen::Vector3d::Zero();  // INT x dS
 };
 Moments moments(const CurvedMesh& mesh) {
-    const Tabulation table(mesh.order, quadrature(default_degree(mesh.order)));
     Moments out;
-    for (int cell = 0; cell < mesh.triangles(); ++cell) {
-        const CellColumns<3> X = cell_nodes(mesh, cell);
-        for (int q = 0; q < table.points(); ++q) {
-            const auto p = tangent_point(X, table, q);
-            out.area += table.weight[q] * p.area;
-            out.first += table.weight[q] * p.area * p.x;
-        }
-    }
+    for_each_point(mesh, default_degree(mesh.order), [&](int, const SurfacePoint<double>& p, double weight) {
+        out.area += weight * p.area, out.first += weight * p.area * p.x;
+    });
     return out;
 }
 
