@@ -25,6 +25,21 @@ double unit_of_beads(const StepBase& base) {
 
 }  // namespace
 
+MotionState StageSolution::state(double time, double step) const {
+    return {.time = time,
+            .step = step,
+            .X = X,
+            .w = w,
+            .u = u,
+            .p = p,
+            .lambda = lambda,
+            .tension = tension,
+            .force = force,
+            .period = period,
+            .stretch = stretch,
+            .memory = {}};
+}
+
 StepSolver::StepSolver(MovingSurface& surface)
     : surface_(surface),
       unknowns_(surface.mesh(), surface.law(), surface.bending()),

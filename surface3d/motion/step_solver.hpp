@@ -28,6 +28,8 @@ struct StageSolution {
     double lambda = 0, tension = 0, force = 0, period = 0, stretch = 0;  // as those of MotionState
     MotionFields fields;                                                 // of the surface that was expected
     bool keeps_volume = false;
+
+    MotionState state(double time, double step) const;  // that of its end, `step` after the last
 };
 
 // What keeping area and volume took: free energy, to first order, and what was lacking of them.

@@ -65,17 +65,11 @@ bool too_coarse_at_places(const Problem& c, const CurvedMesh& mesh) {
     return wave_coarseness(mesh, fields, c.energy).value > spare_at_places;
 }
 
-bool is_rough_at_first(const Start& start, int order) {
-    const CurvedMesh mesh = start.mesh(first_triangles, order).mesh;
-    const SurfaceSpace space(mesh);
-    return is_rough(smoothness_of(mesh, motion_fields(space, mesh, Projection(space, mesh)).H));
-}
-
 // The number of triangles from which on the initial energy is as accurate as asked, by a coarser mesh and by a
 // finer one: two of them may agree by chance.
 int triangles_for_start(const Problem& c, const Start& start) {
     const int order = c.element_order;
-    const bool rough = is_rough_at_first(start, order);
+    const bool rough = is_rough(start.mesh(first_triangles, order).mesh);
     MotionSettings other{.role = Role::fewer_triangles};
     for (int n = first_triangles;; n = static_cast<int>(growth_of_start * n)) {
         const StartMesh mesh = start.mesh(n, order), coarse = start.mesh(fewer_triangles(n), order);
@@ -97,6 +91,11 @@ int triangles_for_start(const Problem& c, const Start& start) {
 
 bool is_rough(const Smoothness& smoothness) {
     return smoothness.order < rough_below && smoothness.missed > rough_missed;
+}
+
+bool is_rough(const CurvedMesh& mesh) {
+    const SurfaceSpace space(mesh);
+    return is_rough(smoothness_of(mesh, motion_fields(space, mesh, Projection(space, mesh)).H));
 }
 
 MotionSettings first_settings(const Problem& c, const Start& start) {

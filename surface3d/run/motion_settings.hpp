@@ -39,6 +39,7 @@ double growth_of_companion(const Problem& c, const Smoothness& start);
 
 // Whether the mesh does not resolve what it has to represent, by H.
 bool is_rough(const Smoothness& smoothness);
+bool is_rough(const CurvedMesh& mesh);
 
 // Fluids with rough initial shapes keep waves that no step resolves. The error of their energy is larger at some times
 // than its companion and the balance show at others: the factor by which the stated error is larger, else 1.

@@ -114,12 +114,6 @@ bool can_be_repeated(const Problem& c, const surface3d::Start& start) {
            !c.surface_resolution_given();
 }
 
-bool is_rough(const surface3d::CurvedMesh& mesh) {
-    const surface3d::SurfaceSpace space(mesh);
-    const auto fields = motion_fields(space, mesh, surface3d::Projection(space, mesh));
-    return surface3d::is_rough(smoothness_of(mesh, fields.H));
-}
-
 // For surfaces that do not move, whose number of triangles is given.
 std::optional<Forecast> forecast_at_rest(const Problem& c) {
     if (c.unknowns != Unknowns::surface || !c.surface.elements) return std::nullopt;

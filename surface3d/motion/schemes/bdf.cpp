@@ -123,19 +123,7 @@ public:
         const Past past(from, memory, tau);
         const int order = memory ? std::clamp(memory->order, 1, std::min(most_order, past.points())) : 1;
         const StageSolution solved = solve(from, past, order, tau);
-        MotionStep out{.state = {.time = from.time + tau,
-                                 .step = tau,
-                                 .X = solved.X,
-                                 .w = solved.w,
-                                 .u = solved.u,
-                                 .p = solved.p,
-                                 .lambda = solved.lambda,
-                                 .tension = solved.tension,
-                                 .force = solved.force,
-                                 .period = solved.period,
-                                 .stretch = solved.stretch,
-                                 .memory = {}},
-                       .order = order};
+        MotionStep out{.state = solved.state(from.time + tau, tau), .order = order};
         const std::vector<double> misses = missed_by(past, solved);
         out.error = error(past, misses, order, solved);
         out.correction = solver_.keep_extent(solved, out.state).energy;

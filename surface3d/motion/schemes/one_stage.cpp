@@ -63,18 +63,7 @@ StageSolution OneStageScheme::solve(const MotionState& from, const PastState* pa
 
 MotionState OneStageScheme::end_of(const MotionState& from, const StageSolution& solved, const OneStage& stage,
                                    double tau) {
-    MotionState to{.time = from.time + tau,
-                   .step = tau,
-                   .X = solved.X,
-                   .w = solved.w,
-                   .u = solved.u,
-                   .p = solved.p,
-                   .lambda = solved.lambda,
-                   .tension = solved.tension,
-                   .force = solved.force,
-                   .period = solved.period,
-                   .stretch = solved.stretch,
-                   .memory = {}};
+    MotionState to = solved.state(from.time + tau, tau);
     if (stage.level == 1) return to;
     to.X = from.X + (to.X - from.X) / stage.level;
     to.w = from.w + (to.w - from.w) / stage.level;
