@@ -76,14 +76,9 @@ SeriesTable<CurveRow> curve_series(const Problem& c) {
     table.add({{"time", [](const CurveRow& r) { return r.time; }},
                {"step_size", [](const CurveRow& r) { return r.integrator.step_size(); }},
                {"order", [](const CurveRow& r) { return static_cast<double>(r.integrator.order()); }},
-               {"newton_iterations", [](const CurveRow& r) { return static_cast<double>(r.newton_iterations); }},
-               {"energy", [](const CurveRow& r) { return r.now.o.energy; }}});
-    table.add_family("energy_<kl>", term_names(c.energy),
-                     [](const CurveRow& r, std::size_t term) { return r.now.o.energy_term[term]; });
-    if (c.energy.kg > 0) table.add({{"energy_kg", [](const CurveRow& r) { return r.now.o.energy_kg; }}});
-    if (c.energy.alpha)
-        table.add({{"energy_alpha", [](const CurveRow& r) { return r.now.o.energy_alpha; }},
-                   {"M", [](const CurveRow& r) { return r.now.o.M; }}});
+               {"newton_iterations", [](const CurveRow& r) { return static_cast<double>(r.newton_iterations); }}});
+    add_energies(
+        table, c.energy, [](const CurveRow& r) -> const auto& { return r.now.o; });
     const MotionLaw law = c.law;
     if (!c.energy.potentials.empty())
         table.add({{"potential_energy", [](const CurveRow& r) { return r.now.o.potential.energy; }}});

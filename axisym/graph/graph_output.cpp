@@ -15,11 +15,8 @@ SeriesTable<GraphRow> graph_series(const Problem& c) {
     table.add({{"time", [](const GraphRow& r) { return r.time; }},
                {"step_size", [](const GraphRow& r) { return r.integrator.step_size(); }},
                {"order", [](const GraphRow& r) { return static_cast<double>(r.integrator.order()); }},
-               {"newton_iterations", [](const GraphRow& r) { return static_cast<double>(r.newton_iterations); }},
-               {"energy", [](const GraphRow& r) { return r.o.energy; }}});
-    table.add_family("energy_<kl>", term_names(c.energy),
-                     [](const GraphRow& r, std::size_t term) { return r.o.energy_term[term]; });
-    if (c.energy.kg > 0) table.add({{"energy_kg", [](const GraphRow& r) { return r.o.energy_kg; }}});
+               {"newton_iterations", [](const GraphRow& r) { return static_cast<double>(r.newton_iterations); }}});
+    add_energies(table, c.energy, [](const GraphRow& r) -> const Observation& { return r.o; });
     table.add({{"free_energy", [](const GraphRow& r) { return r.o.free_energy; }},
                {"dissipation", [](const GraphRow& r) { return r.o.dissipation; }},
                {"identity_defect", [](const GraphRow& r) { return r.imbalance; }},

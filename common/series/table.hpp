@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/energy/bending.hpp"
 #include "common/series/catalogue.hpp"
 
 namespace tubule {
@@ -44,5 +45,19 @@ public:
 private:
     std::vector<std::pair<std::string, std::function<double(const Row&)>>> columns_;
 };
+
+// The energy and those of its parts that belong to the surface alone; `of`, which captures nothing, gives the integrals
+// of a row, with these names as members.
+template <class Row, class Of>
+void add_energies(SeriesTable<Row>& table, const Bending& energy, const Of& /*of*/) {
+    table.add({{"energy", [](const Row& r) -> double { return Of{}(r).energy; }}});
+    table.add_family("energy_<kl>", term_names(energy),
+                     [](const Row& r, std::size_t term) { return Of{}(r).energy_term[term]; });
+    if (energy.kg > 0) table.add({{"energy_kg", [](const Row& r) -> double { return Of{}(r).energy_kg; }}});
+    if constexpr (requires(const Row& r) { Of{}(r).energy_alpha; })
+        if (energy.alpha)
+            table.add({{"energy_alpha", [](const Row& r) -> double { return Of{}(r).energy_alpha; }},
+                       {"M", [](const Row& r) -> double { return Of{}(r).M; }}});
+}
 
 }  // namespace tubule

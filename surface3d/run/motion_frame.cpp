@@ -98,14 +98,8 @@ SeriesTable<MotionRow> motion_series(const Problem& c) {
     table.add({
         {"time", [](const MotionRow& r) { return r.state.time; }},
         {"step_size", [](const MotionRow& r) { return r.state.step; }},
-        {"energy", [](const MotionRow& r) { return r.measures.bending.energy; }},
     });
-    table.add_family("energy_<kl>", term_names(energy),
-                     [](const MotionRow& r, std::size_t term) { return r.measures.bending.energy_term[term]; });
-    if (energy.kg > 0) table.add({{"energy_kg", [](const MotionRow& r) { return r.measures.bending.energy_kg; }}});
-    if (energy.alpha)
-        table.add({{"energy_alpha", [](const MotionRow& r) { return r.measures.bending.energy_alpha; }},
-                   {"M", [](const MotionRow& r) { return r.measures.bending.M; }}});
+    add_energies(table, energy, [](const MotionRow& r) -> const Observables& { return r.measures.bending; });
     if (!energy.potentials.empty())
         table.add({{"potential_energy", [](const MotionRow& r) { return r.measures.bending.potential; }}});
     table.add({

@@ -229,16 +229,8 @@ struct SingleRow {
 
 SeriesTable<SingleRow> single_series(const Problem& c) {
     SeriesTable<SingleRow> table;
-    table.add({
-        {"time", [](const SingleRow&) { return 0.0; }},
-        {"energy", [](const SingleRow& r) { return r.o.energy; }},
-    });
-    table.add_family("energy_<kl>", term_names(c.energy),
-                     [](const SingleRow& r, std::size_t term) { return r.o.energy_term[term]; });
-    if (c.energy.kg > 0) table.add({{"energy_kg", [](const SingleRow& r) { return r.o.energy_kg; }}});
-    if (c.energy.alpha)
-        table.add({{"energy_alpha", [](const SingleRow& r) { return r.o.energy_alpha; }},
-                   {"M", [](const SingleRow& r) { return r.o.M; }}});
+    table.add({{"time", [](const SingleRow&) { return 0.0; }}});
+    add_energies(table, c.energy, [](const SingleRow& r) -> const Observables& { return r.o; });
     table.add({
         {"area", [](const SingleRow& r) { return r.o.area; }},
         {"volume", [](const SingleRow& r) { return r.o.volume; }},
