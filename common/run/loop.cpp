@@ -45,6 +45,8 @@ void Loop::go_from(const Record* restart, const std::string& note) {
     go();
 }
 
+// 1 step, 2 error, 3 rows and frames, 4 accept, 5 events, 6 end, error, callbacks, pause, 7 checkpoint, 8 new mesh. A
+// stop in 1 or 2 skips the rest: only finish() writes then.
 void Loop::step(double until) try {
     const double from = run_.time();
     until = std::min({until, case_.time.end, run_.lands_on_outputs() ? outputs_.next() : HUGE_VAL});

@@ -21,7 +21,8 @@ public:
 
     void add(std::unique_ptr<Callback> callback) { callbacks_.push_back(std::move(callback)); }
 
-    // One of the first two, once the simulation has its state; then go(), or steps as they are wanted.
+    // begin() or resume(), after the same call of the simulation; then go() to the end, or step() by an owner that
+    // leads the run.
     void begin(const std::string& note = "");
     void resume(const Record& restart);
     void go();

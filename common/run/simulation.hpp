@@ -51,7 +51,8 @@ public:
     // or if all raise the energy: the state is then the last good one.
     virtual std::optional<StopReport> advance(double until) = 0;
     virtual bool lands_on_outputs() const { return false; }  // or its steps pass over them, and at() interpolates
-    // Brings the estimated error to the time of the step. The reason if finer settings should replace this run.
+    // Brings the estimated error to the time of the step; may run companions up to this time. The reason if finer
+    // settings should replace this run.
     virtual std::optional<StopReport> update_error() = 0;
     // Rows at times within the last step, for methods of long steps.
     virtual void write_path(double /*from*/, double /*until*/, RunOutput&) {}

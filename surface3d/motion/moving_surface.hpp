@@ -97,9 +97,8 @@ public:
     // Whether area and volume are the same condition: H is constant to the accuracy of the mesh, and the volume differs
     // from that of the sphere of this area, or of the straight tube, by less than `most_drift`.
     bool area_is_volume(const CurvedMesh& mesh, const MotionFields& fields) const;
-    // The rates of area, volume and distance that take `begin` to the values that are kept at `time`, in a time `span`:
-    // linearised about the surface `at`, as seen from the expected `end`, plus `missed`, which a step like this is
-    // expected to miss.
+    // Rates of area, volume and distance by which `begin` has the kept values after `span`, at `time`. To first order
+    // about `at`; what the extrapolated `end` still lacks and what steps like this miss (`missed`) is added.
     Extent rate_to_keep(const CurvedMesh& at, const CurvedMesh& begin, const CurvedMesh& end, double time, double span,
                         const Extent& missed) const;
     // Corrects area, volume and distance to the values that are kept by displacements along nu, H nu, and nu near the

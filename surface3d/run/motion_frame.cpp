@@ -34,7 +34,7 @@ void memory_fields(Fields&& f, Memory& m) {
     f.optional_number("restart_source_past", m.balance.source_past);
     f.optional_number("restart_bead_distance", m.scale.bead_distance);
     f.number("restart_corrected", m.balance.corrected), f.number("restart_error", m.error);
-    f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.defect);
+    f.number("restart_reference_energy", m.scale.reference_energy), f.number("restart_defect", m.balance.imbalance);
     f.number("restart_dissipation_past", m.balance.dissipation_past), f.number("restart_moved", m.moved);
     f.number("restart_steps", m.count.steps), f.number("restart_rejected", m.count.rejected);
     f.number("restart_mesh_since", m.count.mesh_since), f.number("restart_meshes", m.count.meshes);
@@ -106,7 +106,7 @@ SeriesTable<MotionRow> motion_series(const Problem& c) {
         {"free_energy", [](const MotionRow& r) { return r.measures.free_energy; }},
         {"work", [](const MotionRow& r) { return r.work; }},
         {"dissipation", [](const MotionRow& r) { return r.measures.dissipation; }},
-        {"identity_defect", [](const MotionRow& r) { return r.identity_defect; }},
+        {"identity_defect", [](const MotionRow& r) { return r.imbalance; }},
         {"area", [](const MotionRow& r) { return r.measures.bending.area; }},
         {"volume", [](const MotionRow& r) { return r.measures.bending.volume; }},
         {"height", [](const MotionRow& r) { return r.measures.height; }},

@@ -32,10 +32,11 @@ struct MotionBalance {
     double source_past = 0;                    // and the power of sources
     double dissipated = 0, corrected = 0;
     double dissipation_past = 0;  // its rate at the step before
-    double defect = 0;            // largest defect of the dissipation identity
+    double imbalance = 0;         // largest
 
     double done() const { return work + supplied; }
-    double defect_at(double total) const { return total - total_start + dissipated; }
+    // Defect of the dissipation identity: 0 but for errors.
+    double imbalance_at(double total) const { return total - total_start + dissipated; }
 };
 
 struct MotionCounters {
@@ -79,7 +80,7 @@ MotionRestart motion_restart(const Record& record, Scheme scheme);
 struct MotionRow {
     const MotionState& state;
     const MotionMeasures& measures;
-    double work, volume_drift, identity_defect, correction_energy, energy_error;
+    double work, volume_drift, imbalance, correction_energy, energy_error;
     int elements;
     double wall_seconds;
 };

@@ -42,7 +42,7 @@ public:
         loop_of(run, case_, watch_, clock_).go_from(restart ? &restart->record : nullptr);
         const MotionMemory& memory = run.memory();
         ended_ = {std::move(run.summary),
-                  {memory.error, companions.in_time(), companions.spare() * memory.balance.defect}};
+                  {memory.error, companions.in_time(), companions.spare() * memory.balance.imbalance}};
         judge(companions.stop());
         return ended_.summary;
     }
@@ -78,7 +78,7 @@ private:
                             companion->time, name(companion->reason),
                             companion->message.empty() ? "" : " (" + companion->message + ")"));
         if (!known && !together) ended_.errors.energy = s.reference_energy;
-        const double error = std::max(ended_.errors.energy, ended_.errors.defect);
+        const double error = std::max(ended_.errors.energy, ended_.errors.imbalance);
         s.estimated_error = s.reference_energy > 0 ? error / s.reference_energy : 1;
     }
 

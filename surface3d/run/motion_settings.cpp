@@ -157,7 +157,7 @@ double error_in_time(int order) {
 // kept, once. So it is where errors in time are known apart and those in space are small, and the tolerance is where
 // those in time are.
 MotionSettings finer(const MotionSettings& s, double asked, const MotionErrors& errors) {
-    const double excess = spare * std::max(errors.energy, errors.defect) / asked;
+    const double excess = spare * std::max(errors.energy, errors.imbalance) / asked;
     if (errors.energy <= asked && s.difference == 0)
         return {s.elements, s.tolerance / std::clamp(excess * excess, 4.0, 64.0), errors.energy, s.pair + 1};
     double in_space = excess, in_time = std::pow(excess, 1.5);

@@ -67,7 +67,7 @@ double error_in_time(int order);
 struct MotionErrors {
     double energy = 0;
     std::optional<double> in_time;
-    double defect = 0;
+    double imbalance = 0;
 };
 
 // Settings of the next pair, after one with these errors, for the tolerance `asked`.

@@ -125,12 +125,11 @@ void SurfaceSimulation::set_moving() {
     }
 }
 
-// The force has noise of short wavelength on coarse meshes, which rules the dissipation of the velocity that it drives.
-// The velocity of an implicit step has the less of it the longer the step. The dissipation is extrapolated from steps
-// tau and 4 tau to none, for the pair where that changes least from the pair before, or hardly. Where it changes by
-// much everywhere, noise rules all but the longest.
+// Initial dissipation. Short steps show the noise of the force, longer implicit steps damp it. Steps tau, 4 tau, 16 tau
+// ...: each pair is extrapolated to tau = 0; the pair that changes least from the one before counts (below 0.5 %:
+// enough; all above 10 %: the last).
 double SurfaceSimulation::initial_dissipation() const {
-    constexpr double hardly = 0.005, much = 0.1;
+    constexpr double enough = 0.005, much = 0.1;
     constexpr int most_trials = 6;
     const auto after = [&](double tau) {
         const MotionState soon = scheme_->step(state_, tau).state;
@@ -141,7 +140,7 @@ double SurfaceSimulation::initial_dissipation() const {
     double best = now_.dissipation, least_change = HUGE_VAL;
     try {
         double tau = moment * memory_.next_step, of_step = best, before = 0;
-        for (int i = 0; i < most_trials && !(least_change <= hardly); ++i) {
+        for (int i = 0; i < most_trials && !(least_change <= enough); ++i) {
             const double of_longer = after(tau *= 4), extrapolated = (4 * of_step - of_longer) / 3;
             const double change = i > 0 ? std::abs(extrapolated / before - 1) : HUGE_VAL;
             if (change < least_change || least_change > much) best = extrapolated, least_change = change;
@@ -288,7 +287,7 @@ void SurfaceSimulation::take(const MotionStep& next, const MotionMeasures& m) {
     memory_.order = next.order;
     now_ = m;
     memory_.balance.lowest_total = std::min(memory_.balance.lowest_total, total());
-    memory_.balance.defect = std::max(memory_.balance.defect, std::abs(memory_.balance.defect_at(total())));
+    memory_.balance.imbalance = std::max(memory_.balance.imbalance, std::abs(memory_.balance.imbalance_at(total())));
     ++memory_.count.steps;
     memory_.count.rough += is_rough(m.smoothness);
 }
@@ -511,8 +510,8 @@ std::optional<StopReport> SurfaceSimulation::check_crossing(bool at_output) {
 }
 
 // The error stated in a row is the largest one until then, since at one instant the energies of a pair may agree by
-// chance. It is at least the rise of the energy, and the defect of its balance: both runs of the pair may have these
-// errors in common.
+// chance. It is at least the rise of the energy, and the imbalance: both runs of the pair may have these errors in
+// common.
 std::optional<StopReport> SurfaceSimulation::update_error() {
     if (!is_reported()) return std::nullopt;
     std::optional<double> error;
@@ -520,9 +519,9 @@ std::optional<StopReport> SurfaceSimulation::update_error() {
         error =
             companions_->compare_at(state_.time, comparable(), now_.dissipation, memory_.order, now_.smoothness.order);
     const double rise = total() - memory_.balance.lowest_total, spare = companions_ ? companions_->spare() : 1,
-                 defect = spare * std::abs(memory_.balance.defect_at(total()));
+                 imbalance = spare * std::abs(memory_.balance.imbalance_at(total()));
     if (error) memory_.error = std::max({memory_.error, *error, rise});
-    error_now_ = std::max(error ? memory_.error : memory_.scale.reference_energy, defect);
+    error_now_ = std::max(error ? memory_.error : memory_.scale.reference_energy, imbalance);
     return std::nullopt;
 }
 
@@ -548,7 +547,7 @@ public:
     std::vector<double> row(double wall_seconds) const override {
         const MotionBalance& balance = run_.memory_.balance;
         return motion_series(run_.case_)
-            .values({run_.state_, run_.now_, balance.done(), run_.volume_drift(), balance.defect_at(run_.total()),
+            .values({run_.state_, run_.now_, balance.done(), run_.volume_drift(), balance.imbalance_at(run_.total()),
                      balance.corrected, run_.error_now_, run_.summary.elements, wall_seconds});
     }
 
@@ -589,7 +588,7 @@ void SurfaceSimulation::summarise() {
                                                      {"relaxation", memory_.scale.relaxation},
                                                      {"dissipated", memory_.balance.dissipated},
                                                      {"work", memory_.balance.done()},
-                                                     {"identity_defect", memory_.balance.defect_at(total())},
+                                                     {"identity_defect", memory_.balance.imbalance_at(total())},
                                                      {"correction_energy", memory_.balance.corrected}});
 }
 

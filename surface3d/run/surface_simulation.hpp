@@ -109,10 +109,10 @@ private:
 
     const SchemeEntry& traits() const { return entry(case_.scheme); }
     MovingSurface& surface() const { return scheme_->surface(); }
-    // What can only fall, and the part of it that runs are compared by: without the kinetic energy.
+    // total(): F + kinetic - work - supplied, never rises. comparable(): F - work, by which runs are compared.
     double total() const { return comparable() + now_.kinetic - memory_.balance.supplied; }
-    Extent extent_now() const { return {now_.bending.area, now_.bending.volume, now_.length}; }
     double comparable() const { return now_.free_energy - memory_.balance.work; }
+    Extent extent_now() const { return {now_.bending.area, now_.bending.volume, now_.length}; }
     double moment_of_time() const { return 1e-12 * case_.time.end; }
     double next_kink() const { return tubule::next_kink(surface().law(), state_.time + moment_of_time()); }
 
