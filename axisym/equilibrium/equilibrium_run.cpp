@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "axisym/curve/curve_measures.hpp"
@@ -21,19 +19,13 @@
 #include "common/equilibrium/equilibrium_task.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/run_clock.hpp"
-#include "common/series/table.hpp"
+#include "common/run/shape_run.hpp"
 
 namespace tubule::axisym {
 namespace {
 
-// The table [equilibrium], resolved for this start.
-struct Task {
+struct Task : ShapeTask<Equilibrium, EquilibriumSettings> {
     Curve start;
-    StationaryProblem problem;
-    SetParameter set;  // of a branch
-    BranchSettings branch;
-    EquilibriumSettings settings;
 };
 
 constexpr double largest_of_family = 0.99;  // reduced volume where the search begins
@@ -111,15 +103,7 @@ Task task_of(const Problem& c) {
         std::max(task.settings.elements, elements_for(c.energy.potentials, ArcLength(task.start).total()));
     task.settings.max_elements = std::max(task.settings.max_elements, 2 * task.settings.elements);
     if (c.law.beads) task.problem.bead_distance = bead_distance(c, task.start);
-    if (const BranchChoices& b = e.branch; b.parameter) {
-        task.set = setter(*b.parameter);
-        BranchSettings& branch = task.branch;
-        branch.shapes = task.settings;
-        branch.output = branch_outputs(c, task.problem);
-        branch.from = branch.output.front(), branch.to = branch.output.back();
-        branch.branches = b.branches;
-        branch.mode = b.mode.value_or(0), branch.amplitude = b.amplitude.value_or(branch.amplitude);
-    }
+    task.resolve_branch(c);
     check_problem(c, task.problem, task.start.length);
     return task;
 }
@@ -136,19 +120,11 @@ Sample sample(const CurveSpace& space, const Eigen::VectorXd& x, double s) {
     return {beside != s ? 0 : at.r, at.z, p.H, p.K};
 }
 
-int elements_of(const Equilibrium& e) {
-    return e.space->images() * e.space->splines().elements();
-}
-
-// What the values of a row come from: a shape.
-struct ShapeRow {
-    int number;
-    const BranchPoint& point;
-    const StationaryProblem& problem;
+struct Row : ShapeRow<Equilibrium> {
     const CurveObservation& o;
     const ShapeMeasures& measures;
     const std::vector<ModeRates>& modes;
-    double distance_to_start, wall_seconds;
+    double distance_to_start;
 };
 
 // The first mode whose growth is found: with a free period, axisymmetric displacements change the period, too, and
@@ -157,163 +133,38 @@ int first_mode(const Problem& c) {
     return c.model.free_period ? 1 : 0;
 }
 
-SeriesTable<ShapeRow> shape_series(const Problem& c) {
-    const EquilibriumChoices& choices = *c.equilibrium;
-    SeriesTable<ShapeRow> table;
-    table.add({{"time", [](const ShapeRow& r) { return static_cast<double>(r.number); }}});
-    if (choices.branch.parameter)
-        table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
-                   {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
-    if (choices.branch.branches)
-        table.add({{"branch", [](const ShapeRow& r) { return static_cast<double>(r.point.branch); }}});
-    table.add({{"energy", [](const ShapeRow& r) { return r.o.energy; }}});
+SeriesTable<Row> shape_series(const Problem& c) {
+    SeriesTable<Row> table;
+    add_first_columns(table, c.equilibrium->branch);
     table.add_family("energy_<kl>", term_names(c.energy),
-                     [](const ShapeRow& r, std::size_t term) { return r.o.energy_term[term]; });
+                     [](const Row& r, std::size_t term) { return r.o.energy_term[term]; });
     if (c.energy.kg > 0 || c.equilibrium->branch.parameter == vary_kg)
-        table.add({{"energy_kg", [](const ShapeRow& r) { return r.o.energy_kg; }}});
+        table.add({{"energy_kg", [](const Row& r) { return r.o.energy_kg; }}});
     if (c.energy.alpha)
-        table.add({{"energy_alpha", [](const ShapeRow& r) { return r.o.energy_alpha; }},
-                   {"M", [](const ShapeRow& r) { return r.o.M; }}});
+        table.add({{"energy_alpha", [](const Row& r) { return r.o.energy_alpha; }},
+                   {"M", [](const Row& r) { return r.o.M; }}});
     if (!c.energy.potentials.empty())
-        table.add({{"potential_energy", [](const ShapeRow& r) { return r.o.potential.energy; }}});
-    table.add({{"free_energy",
-                [](const ShapeRow& r) {
-                    return r.o.energy + r.problem.loads.energy(r.o.area, r.o.volume, r.point.shape.length);
-                }},
-               {"area", [](const ShapeRow& r) { return r.o.area; }},
-               {"volume", [](const ShapeRow& r) { return r.o.volume; }},
-               {"reduced_volume", [](const ShapeRow& r) { return reduced_volume(r.o.area, r.o.volume); }},
-               {"tension", [](const ShapeRow& r) { return r.point.shape.sigma; }},
-               {"pressure", [](const ShapeRow& r) { return -r.point.shape.lambda; }}});
+        table.add({{"potential_energy", [](const Row& r) { return r.o.potential.energy; }}});
+    add_extents(table);
     if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape) || c.law.beads ||
         has_two_rings(c.shape))
-        table.add({{"force", [](const ShapeRow& r) { return axial_force(r.problem, r.point.shape); }}});
-    if (c.law.beads) table.add({{"bead_distance", [](const ShapeRow& r) { return r.point.shape.length; }}});
+        table.add({{"force", [](const Row& r) { return axial_force(r.problem, r.point.shape); }}});
+    if (c.law.beads) table.add({{"bead_distance", [](const Row& r) { return r.point.shape.length; }}});
     if (!c.energy.potentials.empty())
-        table.add({{"potential_force", [](const ShapeRow& r) { return r.o.potential.force; }}});
-    table.add({{"negative_directions", [](const ShapeRow& r) { return static_cast<double>(r.point.index); }},
-               {"meridian_length", [](const ShapeRow& r) { return r.o.length; }},
-               {"height", [](const ShapeRow& r) { return r.measures.height; }},
-               {"r_middle", [](const ShapeRow& r) { return r.measures.r_middle; }},
-               {"r_max", [](const ShapeRow& r) { return r.measures.r_max; }},
-               {"pole_curvature", [](const ShapeRow& r) { return r.measures.pole_curvature; }},
-               {"distance_to_start", [](const ShapeRow& r) { return r.distance_to_start; }}});
+        table.add({{"potential_force", [](const Row& r) { return r.o.potential.force; }}});
+    table.add({{"negative_directions", [](const Row& r) { return static_cast<double>(r.point.index); }},
+               {"meridian_length", [](const Row& r) { return r.o.length; }},
+               {"height", [](const Row& r) { return r.measures.height; }},
+               {"r_middle", [](const Row& r) { return r.measures.r_middle; }},
+               {"r_max", [](const Row& r) { return r.measures.r_max; }},
+               {"pole_curvature", [](const Row& r) { return r.measures.pole_curvature; }},
+               {"distance_to_start", [](const Row& r) { return r.distance_to_start; }}});
     std::vector<std::string> waves;
-    for (int m = first_mode(c); m <= choices.modes.value_or(-1); ++m) waves.push_back(std::to_string(m));
-    table.add_family("growth_<m>", waves, [](const ShapeRow& r, std::size_t m) {
-        return r.modes[m].rates.empty() ? 0 : r.modes[m].rates[0];
-    });
-    table.add({{"energy_error",
-                [](const ShapeRow& r) { return r.point.shape.estimated_error * r.point.shape.reference_energy; }},
-               {"elements", [](const ShapeRow& r) { return static_cast<double>(elements_of(r.point.shape)); }},
-               {"wall_seconds", [](const ShapeRow& r) { return r.wall_seconds; }}});
+    for (int m = first_mode(c); m <= c.equilibrium->modes.value_or(-1); ++m) waves.push_back(std::to_string(m));
+    table.add_family("growth_<m>", waves,
+                     [](const Row& r, std::size_t m) { return r.modes[m].rates.empty() ? 0 : r.modes[m].rates[0]; });
+    add_last_columns(table);
     return table;
-}
-
-class Writer {
-public:
-    Writer(const Problem& c, const Task& task, RunObserver& observer)
-        : c_(c),
-          task_(task),
-          observer_(observer),
-          series_(shape_series(c)),
-          started_(std::chrono::steady_clock::now()) {}
-
-    void operator()(const BranchPoint& point) {
-        const Equilibrium& e = point.shape;
-        StationaryProblem problem = task_.problem;
-        if (task_.set) task_.set(problem, point.parameter);
-        std::vector<ModeRates> modes;
-        if (const auto last = c_.equilibrium->modes) {
-            const bool known = e.stop == Stop::finished;
-            const ModeStability stability(problem, e);
-            for (int m = first_mode(c_); m <= *last; ++m)
-                modes.push_back(known ? stability.rates(m, c_.law) : ModeRates{.m = m});
-        }
-        observer_.row(row(point, problem, modes));
-        observer_.frame([&] { return frame(point, modes); });
-        observer_.progress(point.parameter, e.observed.energy, 0);
-        worst_ = std::max(worst_, e.estimated_error);
-        last_ = e;
-        ++count_;
-    }
-
-    int count() const { return count_; }
-    double worst() const { return worst_; }
-    const Equilibrium& last() const { return last_; }
-
-private:
-    std::vector<double> row(const BranchPoint& point, const StationaryProblem& problem,
-                            const std::vector<ModeRates>& modes) const {
-        const Equilibrium& e = point.shape;
-        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-        const double moved = hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)));
-        return series_.values({count_, point, problem, e.observed, measures(*e.space, e.x), modes, moved, seconds});
-    }
-
-    Record frame(const BranchPoint& point, const std::vector<ModeRates>& modes) const {
-        const Equilibrium& e = point.shape;
-        std::vector<double> parameters;
-        const auto sample_at = [&](double s) {
-            parameters.push_back(s);
-            return sample(*e.space, e.x, s);
-        };
-        const std::vector<Sample> samples = sample_profile(*e.space, sample_at, [](Sample&) {});
-        Record out;
-        out.time = count_, out.kind = RecordKind::equilibrium;
-        out.numbers = {{"energy", e.observed.energy},
-                       {"length", e.space->length(e.x.data())},
-                       {"tension", e.sigma},
-                       {"pressure", -e.lambda}};
-        if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
-        add_columns(out, samples, {{"r", &Sample::r}, {"z", &Sample::z}, {"H", &Sample::H}, {"K", &Sample::K}});
-        if (c_.energy.H0_varies()) {
-            std::vector<double> H0 = CurveForms(*e.space, c_.energy).H0_at(e.x, parameters);
-            if (e.space->images() == 2) H0.insert(H0.end(), H0.rbegin() + 1, H0.rend());
-            out.arrays.push_back(array("H0", std::move(H0)));
-        }
-        for (const ModeRates& mode : modes)
-            if (!mode.shape.empty())
-                out.arrays.push_back({fmt::format("displacement_{}", mode.m), {mode.shape.size()}, mode.shape});
-        return out;
-    }
-
-    // Moved along the axis such that the mean height over the arc length is zero.
-    static Curve centred(Curve m) {
-        if (m.topology != Topology::cell) return m;
-        const ArcLength arc(m);
-        constexpr int points = 400;
-        double mean = 0;
-        for (int i = 0; i < points; ++i) mean += arc.point((i + 0.5) / points)[1] / points;
-        m.at = [at = m.at, mean](double t) {
-            auto p = at(t);
-            p[2] -= mean;
-            return p;
-        };
-        return m;
-    }
-
-    const Problem& c_;
-    const Task& task_;
-    RunObserver& observer_;
-    SeriesTable<ShapeRow> series_;
-    std::chrono::steady_clock::time_point started_;
-    int count_ = 0;
-    double worst_ = 0;
-    Equilibrium last_;
-};
-
-std::string advice_for(Stop stop) {
-    switch (stop) {
-        case Stop::solver_failed:
-            return "start from a shape closer to the solution, or raise accuracy.energy";
-        case Stop::resolution_lost:
-            return "raise accuracy.energy; a neck that closes cannot be followed to its end";
-        case Stop::self_intersection:
-            return "the equations can still be solved, but their solution is no longer an embedded surface";
-        default:
-            return "";
-    }
 }
 
 bool meets(const Constraints& held, const CurveObservation& o) {
@@ -332,28 +183,108 @@ std::optional<theory::LimitShape> limit_of(const Task& task) {
     return theory::vesiculated_limit(task.problem.bending, *held.area, *held.volume);
 }
 
-// Writes the shape, or those of the branch, and says how it ended; adds what to warn of.
-StopReport find_shapes(const Task& task, Writer& write, std::vector<std::string>& warnings) {
-    const Equilibrium first = find_equilibrium(task.problem, task.start, task.settings);
-    if (first.stop != Stop::finished || !task.set) {
-        BranchPoint only;
-        only.shape = first;
-        only.parameter = task.branch.from;
-        only.index = first.stop == Stop::finished ? first.negative_directions : -1;
-        if (first.observed.area > 0 && std::isfinite(first.observed.energy)) write(only);
-        return {first.stop, 0, first.stop == Stop::finished ? "the shape is stationary" : first.message,
-                advice_for(first.stop)};
-    }
-    BranchSettings settings = task.branch;
-    settings.found = [&](const BranchPoint& point) {
-        write(point);
-        pause_if_due();
+// Moved along the axis such that the mean height over the arc length is zero.
+Curve centred(Curve m) {
+    if (m.topology != Topology::cell) return m;
+    const ArcLength arc(m);
+    constexpr int points = 400;
+    double mean = 0;
+    for (int i = 0; i < points; ++i) mean += arc.point((i + 0.5) / points)[1] / points;
+    m.at = [at = m.at, mean](double t) {
+        auto p = at(t);
+        p[2] -= mean;
+        return p;
     };
-    Branch branch = follow_branches(task.problem, first, task.set, settings, follow_branch);
-    warnings = std::move(branch.warnings);
-    return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
-            advice_for(branch.stop)};
+    return m;
 }
+
+// What run_shapes() asks for.
+class CurveShapes {
+public:
+    using Shape = Equilibrium;
+
+    explicit CurveShapes(const Problem& c) : c_(c), task_(task_of(c)), series_(shape_series(c)) {}
+
+    const Task& task() const { return task_; }
+    Equilibrium find() const { return find_equilibrium(task_.problem, task_.start, task_.settings); }
+    static int negative_directions(const Equilibrium& e) { return e.negative_directions; }
+    static double energy(const Equilibrium& e) { return e.observed.energy; }
+    static Extents extents(const StationaryProblem&, const Equilibrium& e) {
+        return {e.observed.area, e.observed.volume, e.length};
+    }
+    static int elements(const Equilibrium& e) { return e.space->images() * e.space->splines().elements(); }
+
+    void write(const ShapeRow<Equilibrium>& row, RunObserver& observer) const {
+        const Equilibrium& e = row.point.shape;
+        std::vector<ModeRates> modes;
+        if (const auto last = c_.equilibrium->modes) {
+            const bool known = e.stop == Stop::finished;
+            const ModeStability stability(row.problem, e);
+            for (int m = first_mode(c_); m <= *last; ++m)
+                modes.push_back(known ? stability.rates(m, c_.law) : ModeRates{.m = m});
+        }
+        const double moved = hausdorff_distance(centred(task_.start), centred(meridian(*e.space, e.x)));
+        observer.row(series_.values({row, e.observed, measures(*e.space, e.x), modes, moved}));
+        observer.frame([&] { return frame(row, modes); });
+    }
+
+    static std::string advice(Stop stop) {
+        switch (stop) {
+            case Stop::solver_failed:
+                return "start from a shape closer to the solution, or raise accuracy.energy";
+            case Stop::resolution_lost:
+                return "raise accuracy.energy; a neck that closes cannot be followed to its end";
+            case Stop::self_intersection:
+                return "the equations can still be solved, but their solution is no longer an embedded surface";
+            default:
+                return "";
+        }
+    }
+
+    void describe(const FoundShapes<Equilibrium>& found, RunSummary& s) const {
+        const double energy = found.last.observed.energy;
+        if (const auto limit = limit_of(task_);
+            limit && !task_.set && s.stop.reason == Stop::finished && limit->energy < energy)
+            s.warnings.push_back(
+                fmt::format("a vesiculated limit has less energy, {:.6g} for {:.6g}: {}, joined by necks that shrink "
+                            "to points. This shape is at best a local minimum",
+                            limit->energy, energy, described(*limit)));
+        s.effort =
+            fmt::format("{} shape{}, {} elements in the last", found.count, found.count == 1 ? "" : "s", s.elements);
+    }
+
+private:
+    Record frame(const ShapeRow<Equilibrium>& row, const std::vector<ModeRates>& modes) const {
+        const Equilibrium& e = row.point.shape;
+        std::vector<double> parameters;
+        const auto sample_at = [&](double s) {
+            parameters.push_back(s);
+            return sample(*e.space, e.x, s);
+        };
+        const std::vector<Sample> samples = sample_profile(*e.space, sample_at, [](Sample&) {});
+        Record out;
+        out.time = row.number, out.kind = RecordKind::equilibrium;
+        out.numbers = {{"energy", row.energy},
+                       {"length", e.space->length(e.x.data())},
+                       {"tension", e.sigma},
+                       {"pressure", -e.lambda}};
+        if (task_.set) out.numbers.emplace_back("parameter", row.point.parameter);
+        add_columns(out, samples, {{"r", &Sample::r}, {"z", &Sample::z}, {"H", &Sample::H}, {"K", &Sample::K}});
+        if (c_.energy.H0_varies()) {
+            std::vector<double> H0 = CurveForms(*e.space, c_.energy).H0_at(e.x, parameters);
+            if (e.space->images() == 2) H0.insert(H0.end(), H0.rbegin() + 1, H0.rend());
+            out.arrays.push_back(array("H0", std::move(H0)));
+        }
+        for (const ModeRates& mode : modes)
+            if (!mode.shape.empty())
+                out.arrays.push_back({fmt::format("displacement_{}", mode.m), {mode.shape.size()}, mode.shape});
+        return out;
+    }
+
+    const Problem& c_;
+    const Task task_;
+    const SeriesTable<Row> series_;
+};
 
 }  // namespace
 
@@ -377,35 +308,10 @@ CaseShape find_shape(const Problem& c, RunObserver& observer) {
 
 RunSummary run_equilibrium(const Problem& c, RunObserver& observer) {
     const RunClock clock(c.time, observer);
-    const Task task = task_of(c);
-    Writer write(c, task, observer);
-    RunSummary s;
-    StopReport stop;
-    try {
-        stop = find_shapes(task, write, s.warnings);
-    } catch (const Paused& pause) {
-        stop = pause_report(pause, 0);
-        stop.message += " before all shapes were found";
-        stop.advice = "run the case again: equilibria are not resumed";
-    }
-    if (std::string endless = unbounded_below(c.energy); !endless.empty()) s.warnings.push_back(std::move(endless));
-    if (const auto limit = limit_of(task);
-        limit && !task.set && stop.reason == Stop::finished && limit->energy < write.last().observed.energy)
-        s.warnings.push_back(
-            fmt::format("a vesiculated limit has less energy, {:.6g} for {:.6g}: {}, joined by necks that shrink to "
-                        "points. This shape is at best a local minimum",
-                        limit->energy, write.last().observed.energy, described(*limit)));
-    s.energy = write.last().observed.energy;
-    s.reference_energy = write.last().reference_energy;
-    s.elements = write.count() > 0 ? elements_of(write.last()) : 0;
-    s.estimated_error = write.count() > 0 ? write.worst() : 1;
-    s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    stop.time = std::max(write.count() - 1, 0);
-    s.stop = stop;
-    s.effort =
-        fmt::format("{} shape{}, {} elements in the last", write.count(), write.count() == 1 ? "" : "s", s.elements);
-    s.details = {{"shapes", std::int64_t{write.count()}}, {"elements", std::int64_t{s.elements}}};
-    return s;
+    return clock.pausing([&] {
+        CurveShapes shapes(c);
+        return run_shapes(c, shapes, clock, observer);
+    });
 }
 
 }  // namespace tubule::axisym

@@ -8,8 +8,7 @@
 #include "common/case/read.hpp"
 #include "common/equilibrium/equilibrium_task.hpp"
 #include "common/run/energy_checks.hpp"
-#include "common/run/run_clock.hpp"
-#include "common/series/table.hpp"
+#include "common/run/shape_run.hpp"
 #include "surface3d/equilibrium/surface_branch.hpp"
 #include "surface3d/fem/mesh_quality.hpp"
 #include "surface3d/fem/projection.hpp"
@@ -21,12 +20,7 @@ namespace {
 
 constexpr int many = 2000;  // triangles, for the area and volume of an initial shape to 1e-8
 
-struct Task {
-    StationaryProblem problem;
-    SurfaceEquilibriumSettings settings;
-    SetParameter set;  // of a branch
-    BranchSettings branch;
-};
+using Task = ShapeTask<SurfaceEquilibrium, SurfaceEquilibriumSettings>;
 
 Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
@@ -50,24 +44,14 @@ Task task_of(const Problem& c, const Start& start) {
         s.triangles = mesh.triangles();
     else
         s.triangles = c.surface.elements.value_or(0);
-    if (const BranchChoices& b = c.equilibrium->branch; b.parameter) {
-        task.set = setter(*b.parameter);
-        task.branch.shapes = s;
-        task.branch.output = branch_outputs(c, task.problem);
-        task.branch.from = task.branch.output.front(), task.branch.to = task.branch.output.back();
-        task.branch.branches = b.branches;
-        task.branch.mode = b.mode.value_or(0), task.branch.amplitude = b.amplitude.value_or(task.branch.amplitude);
-    }
+    task.resolve_branch(c);
     return task;
 }
 
-struct ShapeRow {
-    int number;
-    const BranchPoint& point;
-    const StationaryProblem& problem;
+struct Row : ShapeRow<SurfaceEquilibrium> {
     const SurfaceEquilibrium& shape;
-    const std::vector<double>& terms;
-    double height, r_max, wall_seconds;
+    std::vector<double> terms;
+    double height, r_max;
 };
 
 // The centre of the area.
@@ -89,60 +73,39 @@ std::array<double, 2> height_and_radius(const CurvedMesh& mesh) {
     return {mesh.period > 0 ? mesh.period : high - low, r};
 }
 
-SeriesTable<ShapeRow> shape_series(const Problem& c) {
-    SeriesTable<ShapeRow> table;
-    table.add({{"time", [](const ShapeRow& r) { return static_cast<double>(r.number); }}});
-    if (c.equilibrium->branch.parameter)
-        table.add({{"parameter", [](const ShapeRow& r) { return r.point.parameter; }},
-                   {"special", [](const ShapeRow& r) { return static_cast<double>(r.point.kind); }}});
-    if (c.equilibrium->branch.branches)
-        table.add({{"branch", [](const ShapeRow& r) { return static_cast<double>(r.point.branch); }}});
-    table.add({{"energy", [](const ShapeRow& r) { return r.shape.values.energy; }}});
-    table.add_family("energy_<kl>", term_names(c.energy),
-                     [](const ShapeRow& r, std::size_t term) { return r.terms[term]; });
+SeriesTable<Row> shape_series(const Problem& c) {
+    SeriesTable<Row> table;
+    add_first_columns(table, c.equilibrium->branch);
+    table.add_family("energy_<kl>", term_names(c.energy), [](const Row& r, std::size_t term) { return r.terms[term]; });
     if (c.energy.alpha)
-        table.add({{"energy_alpha",
-                    [](const ShapeRow& r) { return area_difference_energy(r.problem.bending, r.shape.values.M); }},
-                   {"M", [](const ShapeRow& r) { return r.shape.values.M; }}});
+        table.add(
+            {{"energy_alpha", [](const Row& r) { return area_difference_energy(r.problem.bending, r.shape.values.M); }},
+             {"M", [](const Row& r) { return r.shape.values.M; }}});
     if (!c.energy.potentials.empty())
-        table.add({{"potential_energy", [](const ShapeRow& r) { return r.shape.values.potential; }},
-                   {"potential_force", [](const ShapeRow& r) { return r.shape.values.potential_force; }}});
-    table.add({{"free_energy",
-                [](const ShapeRow& r) {
-                    const EnergyValues& v = r.shape.values;
-                    return v.energy + r.problem.loads.energy(v.area, v.volume, length(r.problem, r.shape));
-                }},
-               {"area", [](const ShapeRow& r) { return r.shape.values.area; }},
-               {"volume", [](const ShapeRow& r) { return r.shape.values.volume; }},
-               {"reduced_volume",
-                [](const ShapeRow& r) { return reduced_volume(r.shape.values.area, r.shape.values.volume); }},
-               {"tension", [](const ShapeRow& r) { return r.shape.sigma; }},
-               {"pressure", [](const ShapeRow& r) { return -r.shape.lambda; }}});
+        table.add({{"potential_energy", [](const Row& r) { return r.shape.values.potential; }},
+                   {"potential_force", [](const Row& r) { return r.shape.values.potential_force; }}});
+    add_extents(table);
     if (c.law.beads)
-        table.add({{"force", [](const ShapeRow& r) { return r.shape.beads.force; }},
-                   {"bead_distance", [](const ShapeRow& r) { return length(r.problem, r.shape); }}});
-    table.add({{"negative_directions", [](const ShapeRow& r) {
-                    return r.shape.stop == Stop::finished ? static_cast<double>(r.point.index) : -1.0;
-                }}});
+        table.add({{"force", [](const Row& r) { return r.shape.beads.force; }},
+                   {"bead_distance", [](const Row& r) { return r.extents.length; }}});
+    table.add({{"negative_directions", [](const Row& r) { return static_cast<double>(r.point.index); }}});
     std::vector<std::string> numbers;
     for (int i = 1; i <= c.equilibrium->rates.value_or(0); ++i) numbers.push_back(std::to_string(i));
-    table.add_family("rate_<i>", numbers, [](const ShapeRow& r, std::size_t i) {
+    table.add_family("rate_<i>", numbers, [](const Row& r, std::size_t i) {
         const Eigen::VectorXd& values = r.shape.spectrum.values;
         return static_cast<Eigen::Index>(i) < values.size() ? -values[i] : 0.0;
     });
-    table.add_family("rate_error_<i>", numbers, [](const ShapeRow& r, std::size_t i) {
+    table.add_family("rate_error_<i>", numbers, [](const Row& r, std::size_t i) {
         const Eigen::VectorXd& errors = r.shape.spectrum.errors;
         return static_cast<Eigen::Index>(i) < errors.size() ? errors[i] : -1.0;
     });
-    table.add_family("wave_number_<i>", numbers, [](const ShapeRow& r, std::size_t i) {
+    table.add_family("wave_number_<i>", numbers, [](const Row& r, std::size_t i) {
         return i < r.shape.wave_numbers.size() ? r.shape.wave_numbers[i] : -1.0;
     });
-    table.add({{"height", [](const ShapeRow& r) { return r.height; }},
-               {"r_max", [](const ShapeRow& r) { return r.r_max; }},
-               {"quality", [](const ShapeRow& r) { return mesh_quality(r.shape.mesh).worst; }},
-               {"energy_error", [](const ShapeRow& r) { return r.shape.estimated_error * r.shape.reference_energy; }},
-               {"elements", [](const ShapeRow& r) { return static_cast<double>(r.shape.mesh.triangles()); }},
-               {"wall_seconds", [](const ShapeRow& r) { return r.wall_seconds; }}});
+    table.add({{"height", [](const Row& r) { return r.height; }},
+               {"r_max", [](const Row& r) { return r.r_max; }},
+               {"quality", [](const Row& r) { return mesh_quality(r.shape.mesh).worst; }}});
+    add_last_columns(table);
     return table;
 }
 
@@ -159,7 +122,7 @@ std::vector<double> energy_terms(const Bending& energy, const CurvedMesh& mesh) 
     return out;
 }
 
-Record frame_of(const ShapeRow& row, std::size_t mesh_number, int modes) {
+Record frame_of(const Row& row, std::size_t mesh_number, int modes) {
     const SurfaceEquilibrium& shape = row.shape;
     Record out;
     out.time = row.number, out.mesh = mesh_number, out.kind = RecordKind::surface;
@@ -177,115 +140,78 @@ Record frame_of(const ShapeRow& row, std::size_t mesh_number, int modes) {
     return out;
 }
 
-std::string advice_for(Stop stop) {
-    switch (stop) {
-        case Stop::solver_failed:
-            return "begin with a shape closer to the solution, such as a result of tier \"axisym\"";
-        case Stop::resolution_lost:
-            return "raise accuracy.energy";
-        case Stop::mesh_lost:
-            return "use more elements, or discretisation.mesh = \"graded\"";
-        case Stop::self_intersection:
-            return "the equations can still be solved, but their solution is no longer an embedded surface";
-        default:
-            return "";
-    }
-}
-
-// Rows, frames and meshes of the shapes, as they are found.
-class ShapeWriter {
+// What run_shapes() asks for.
+class SurfaceShapes {
 public:
-    ShapeWriter(const Problem& c, const Task& task, const RunClock& clock, RunObserver& observer)
-        : c_(c), task_(task), clock_(clock), observer_(observer), series_(shape_series(c)) {}
+    using Shape = SurfaceEquilibrium;
 
-    void operator()(const BranchPoint& point) {
-        const SurfaceEquilibrium& e = point.shape;
-        StationaryProblem problem = task_.problem;
-        if (task_.set) task_.set(problem, point.parameter);
+    SurfaceShapes(const Problem& c, const Start& start)
+        : c_(c), start_(start), task_(task_of(c, start)), series_(shape_series(c)) {}
+
+    const Task& task() const { return task_; }
+    SurfaceEquilibrium find() const {
+        SurfaceEquilibrium shape = find_equilibrium(
+            task_.problem, [&](int triangles) { return start_.mesh(triangles, c_.element_order).mesh; },
+            task_.settings);
+        if (shape.stop == Stop::finished)
+            if (const auto meets = find_self_intersection(shape.mesh))
+                shape.stop = meets->reason, shape.message = meets->message;
+        return shape;
+    }
+    static int negative_directions(const SurfaceEquilibrium& e) { return e.spectrum.negative; }
+    static double energy(const SurfaceEquilibrium& e) { return e.values.energy; }
+    static Extents extents(const StationaryProblem& problem, const SurfaceEquilibrium& e) {
+        return {e.values.area, e.values.volume, length(problem, e)};
+    }
+    static int elements(const SurfaceEquilibrium& e) { return e.mesh.triangles(); }
+
+    void write(const ShapeRow<SurfaceEquilibrium>& at, RunObserver& observer) const {
+        const SurfaceEquilibrium& e = at.point.shape;
         const auto [height, r_max] = height_and_radius(e.mesh);
-        const std::vector<double> terms = energy_terms(problem.bending, e.mesh);
-        const ShapeRow row{count_, point, problem, e, terms, height, r_max, clock_.seconds()};
-        observer_.row(series_.values(row));
-        const std::size_t mesh_number = observer_.mesh(cells_of(e.mesh));
-        observer_.frame([&] {
+        const Row row{at, e, energy_terms(at.problem.bending, e.mesh), height, r_max};
+        observer.row(series_.values(row));
+        const std::size_t mesh_number = observer.mesh(cells_of(e.mesh));
+        observer.frame([&] {
             Record out = frame_of(row, mesh_number, c_.equilibrium->rates.value_or(0));
-            if (task_.set) out.numbers.emplace_back("parameter", point.parameter);
+            if (task_.set) out.numbers.emplace_back("parameter", at.point.parameter);
             return out;
         });
-        observer_.progress(point.parameter, e.values.energy, 0);
-        worst_ = std::max(worst_, e.estimated_error), iterations_ += e.iterations;
-        last_ = e;
-        ++count_;
     }
 
-    int count() const { return count_; }
-    int iterations() const { return iterations_; }
-    double worst() const { return count_ > 0 ? std::min(worst_, 1.0) : 1; }
-    const SurfaceEquilibrium& last() const { return last_; }
+    static std::string advice(Stop stop) {
+        switch (stop) {
+            case Stop::solver_failed:
+                return "begin with a shape closer to the solution, such as a result of tier \"axisym\"";
+            case Stop::resolution_lost:
+                return "raise accuracy.energy";
+            case Stop::mesh_lost:
+                return "use more elements, or discretisation.mesh = \"graded\"";
+            case Stop::self_intersection:
+                return "the equations can still be solved, but their solution is no longer an embedded surface";
+            default:
+                return "";
+        }
+    }
+
+    void describe(const FoundShapes<SurfaceEquilibrium>& found, RunSummary& s) const {
+        const CurvedMesh& mesh = found.last.mesh;
+        if (s.stop.reason == Stop::finished && !s.as_accurate_as_asked)
+            s.warnings.push_back(
+                fmt::format("the energy is less accurate than asked, {:.1e} for {:.1e} of E_ref: the "
+                            "triangles are given",
+                            s.estimated_error, c_.accuracy.energy));
+        s.effort = fmt::format("{} triangles of order {}, {} nodes, {} Newton steps", mesh.triangles(), mesh.order,
+                               mesh.size(), found.iterations);
+        if (task_.set) s.effort = fmt::format("{} shapes; the last: {}", found.count, s.effort);
+        s.details.insert(s.details.end(), {{"nodes", std::int64_t{mesh.size()}}, {"order", std::int64_t{mesh.order}}});
+    }
 
 private:
     const Problem& c_;
-    const Task& task_;
-    const RunClock& clock_;
-    RunObserver& observer_;
-    SeriesTable<ShapeRow> series_;
-    int count_ = 0, iterations_ = 0;
-    double worst_ = 0;
-    SurfaceEquilibrium last_;
+    const Start& start_;
+    const Task task_;
+    const SeriesTable<Row> series_;
 };
-
-// Writes the shape, or those of the branch, and says how it ended; adds what to warn of.
-StopReport find_shapes(const Problem& c, const Start& start, const Task& task, ShapeWriter& write,
-                       std::vector<std::string>& warnings) {
-    BranchPoint first;
-    first.shape = find_equilibrium(
-        task.problem, [&](int triangles) { return start.mesh(triangles, c.element_order).mesh; }, task.settings);
-    SurfaceEquilibrium& shape = first.shape;
-    if (shape.stop == Stop::finished)
-        if (const auto meets = find_self_intersection(shape.mesh))
-            shape.stop = meets->reason, shape.message = meets->message;
-    if (shape.stop != Stop::finished || !task.set) {
-        first.parameter = task.branch.from, first.index = shape.spectrum.negative;
-        write(first);
-        return {shape.stop, 0, shape.stop == Stop::finished ? "the shape is stationary" : shape.message,
-                advice_for(shape.stop)};
-    }
-    BranchSettings settings = task.branch;
-    settings.found = [&](const BranchPoint& point) {
-        write(point);
-        pause_if_due();
-    };
-    Branch branch = follow_branches(task.problem, shape, task.set, settings, follow_branch);
-    warnings = std::move(branch.warnings);
-    return {branch.stop, 0, branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
-            advice_for(branch.stop)};
-}
-
-RunSummary summary_of(const Problem& c, const ShapeWriter& written, StopReport stop) {
-    const SurfaceEquilibrium& shape = written.last();
-    RunSummary s;
-    if (std::string endless = unbounded_below(c.energy); !endless.empty()) s.warnings.push_back(std::move(endless));
-    stop.time = std::max(written.count() - 1, 0);
-    s.stop = std::move(stop);
-    s.energy = shape.values.energy;
-    s.reference_energy = shape.reference_energy;
-    s.elements = shape.mesh.triangles();
-    s.estimated_error = written.worst();
-    s.as_accurate_as_asked = s.estimated_error <= c.accuracy.energy;
-    if (s.stop.reason == Stop::finished && !s.as_accurate_as_asked)
-        s.warnings.push_back(
-            fmt::format("the energy is less accurate than asked, {:.1e} for {:.1e} of E_ref: the "
-                        "triangles are given",
-                        s.estimated_error, c.accuracy.energy));
-    s.effort = fmt::format("{} triangles of order {}, {} nodes, {} Newton steps", shape.mesh.triangles(),
-                           shape.mesh.order, shape.mesh.size(), written.iterations());
-    if (c.equilibrium->branch.parameter) s.effort = fmt::format("{} shapes; the last: {}", written.count(), s.effort);
-    s.details = {{"shapes", std::int64_t{written.count()}},
-                 {"elements", std::int64_t{shape.mesh.triangles()}},
-                 {"nodes", std::int64_t{shape.mesh.size()}},
-                 {"order", std::int64_t{shape.mesh.order}}};
-    return s;
-}
 
 }  // namespace
 
@@ -300,20 +226,8 @@ void check_equilibrium(const Problem& c, const Start& start) {
 RunSummary run_equilibrium(const Problem& c, const Start& start, RunObserver& observer) {
     const RunClock clock(c.time, observer);
     return clock.pausing([&] {
-        const Task task = task_of(c, start);
-        ShapeWriter write(c, task, clock, observer);
-        StopReport stop;
-        std::vector<std::string> warnings;
-        try {
-            stop = find_shapes(c, start, task, write, warnings);
-        } catch (const Paused& pause) {
-            if (write.count() == 0) throw;
-            stop = pause_report(pause, 0);
-            stop.message += " before all shapes were found";
-            stop.advice = "run the case again: equilibria are not resumed";
-        }
-        RunSummary s = summary_of(c, write, std::move(stop));
-        s.warnings.insert(s.warnings.end(), warnings.begin(), warnings.end());
+        SurfaceShapes shapes(c, start);
+        RunSummary s = run_shapes(c, shapes, clock, observer);
         s.warnings.insert(s.warnings.begin(), start.notes().begin(), start.notes().end());
         return s;
     });
