@@ -57,7 +57,7 @@ def poly_data(points, triangles):
 
 
 def contour(values, a):
-    """Of the zero of values[x, y, z] on [-a, a]^3, by marching cubes."""
+    """The surface where values[x, y, z] on [-a, a]^3 are zero, by marching cubes."""
     n = values.shape[0]
     image = vtkImageData()
     image.SetDimensions(n, n, n)

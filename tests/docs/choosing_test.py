@@ -64,7 +64,7 @@ def settings(scene, series, runs):
 
 
 def differences():
-    """Of the vesicle, in percent of the fall of its energy: Stokes, overdamped."""
+    """Stokes and overdamped paths of the vesicle, in percent of the fall of its energy."""
     rows = {(r["Re"], r["gamma"]): r for r in read(SOURCES / "docs/model_differences.csv") if r["scene"] == "vesicle"}
     gammas = list(dict.fromkeys(gamma for _, gamma in rows))
     yield "| Re | " + " | ".join(f"gamma = {gamma}" for gamma in gammas) + " |"

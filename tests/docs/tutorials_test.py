@@ -42,7 +42,7 @@ def commands(block):
 
 
 def unit(text):
-    """Of the last digit that is shown."""
+    """What one in the last digit that is shown stands for."""
     mantissa, _, exponent = text.partition("e")
     return 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
 

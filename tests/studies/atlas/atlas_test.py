@@ -22,7 +22,7 @@ from tool_maps import VALUES, alignment, fits, judged_lines, lines  # noqa: E402
 
 
 class Corners(unittest.TestCase):
-    """Of the map of k40: f_HH = 0.4 + 12 k40 (H - H0)^2 at H = -1 is negative for k40 = -0.1, H0 = -4 and 2."""
+    """The map of k40: f_HH = 0.4 + 12 k40 (H - H0)^2 at H = -1 is negative for k40 = -0.1, H0 = -4 and 2."""
 
     @classmethod
     def setUpClass(cls):
@@ -101,7 +101,7 @@ class Judging(unittest.TestCase):
 
 
 class Lines(unittest.TestCase):
-    """Of a scan with 4 intervals of its lattice, every 6 values: a square of outcome 2."""
+    """A scan with 4 intervals of its lattice, every 6 values: a square of outcome 2."""
 
     def judged(self, low, high, seen, warned):
         every = np.ones((VALUES, VALUES), int)

@@ -62,7 +62,7 @@ class Tube:
         return 2 * np.pi * R * LENGTH * (self.f(-1 / R, 0) + self.tension) - self.pressure * np.pi * R * R * LENGTH
 
     def growth(self, R, q):
-        """Of r = R + a cos(q z): d(log a)/dt = -4 e/R with F = F(R) + 2 pi length e a^2, from H, K and dS to order a^2."""
+        """d(log a)/dt of r = R + a cos(q z): -4 e/R, F = F(R) + 2 pi length e a^2, from H, K and dS to order a^2."""
         f, H = self.f, -1 / R
         h, k = 1 / R**2 - q**2, q**2 / R  # H and K to first order, by a cos(q z)
         mean = f(H, 0, 1) * (-1 / R**3 + q**2 / (2 * R)) - f(H, 0, 0, 1) * q**2 / R**2

@@ -92,7 +92,7 @@ class Space:
         return [np.broadcast_to(value, self.x.shape) for value in found]
 
     def derivatives(self, moduli, y, area, volume):
-        """Of E + tension (A - area) - pressure (V - volume) with respect to all unknowns, once and twice."""
+        """First and second derivatives of E + tension (A - area) - pressure (V - volume) by all unknowns."""
         values = self.values(moduli, y)[6:]
         gradient, hessian, second = np.zeros(y.size), np.zeros((y.size, y.size)), iter(values[7:])
         for i, (B, at) in enumerate(self.blocks):

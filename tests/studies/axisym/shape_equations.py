@@ -113,5 +113,5 @@ class Cell:
 
 
 def gauss_nodes(n):
-    """Of even polynomials on [0, 1]."""
+    """Nodes for even polynomials on [0, 1]."""
     return np.cos(np.pi * (2 * np.arange(n) + 1) / (4 * n))

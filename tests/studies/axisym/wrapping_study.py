@@ -89,7 +89,7 @@ def wrapped(w, tension, z, guess):
 
 
 def height_of_catenoid(angle):
-    """Of a particle that is wrapped up to this angle, of a membrane without tension and force."""
+    """Height of a membrane without tension and force around a particle that is wrapped up to this angle."""
     a, side = math.sin(angle) ** 2, math.copysign(1, angle - math.pi / 2)
     return a * (math.acosh(RING / a) + side * math.acosh(1 / math.sin(angle))) - math.cos(angle)
 

@@ -32,7 +32,7 @@ TINY = 1e-30  # complex step
 
 
 def slopes(psi, u, r, gamma, c, sigma, volume):
-    """Of the shape equations in arc length."""
+    """Right-hand sides of the shape equations in arc length."""
     sin, cos = np.sin(psi), np.cos(psi)
     around = sin / r
     return np.array(

@@ -52,7 +52,7 @@ end = {number(rng, 0.05, 0.3)}
 
 
 def seconds(words):
-    """Of "12 s", "4:05", "1:02:03", "less than a second"."""
+    """What "12 s", "4:05", "1:02:03" and "less than a second" mean."""
     told = re.search(r"about ((?:\d+:)*\d+)(?: s)?, [^,]* MB", words)
     if "less than a second" in words:
         return 1.0

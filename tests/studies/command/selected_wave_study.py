@@ -38,7 +38,7 @@ def fastest():
 
 
 def power(frame):
-    """Of the waves n = 1 ... MODES of a profile."""
+    """Squared amplitudes of the waves n = 1 ... MODES of a profile."""
     z, r = frame["z"][:], frame["r"][:]
     at = np.linspace(z[0], z[0] + frame.attrs["length"], 16 * MODES, endpoint=False)
     return np.abs(np.fft.rfft(np.interp(at, z, r))[1 : MODES + 1]) ** 2

@@ -25,7 +25,7 @@ HEAVY = ("plot", "chart", "confirm", "scan")  # several seconds
 
 @functools.cache
 def options(program):
-    """Of each subcommand, its options with whether they take a value: as --help has them."""
+    """The options of each subcommand with whether they take a value, as --help has them."""
 
     def asked(*arguments):
         return subprocess.run([program, *arguments, "--help"], capture_output=True, text=True, check=True).stdout

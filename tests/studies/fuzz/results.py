@@ -66,7 +66,7 @@ def of_the_sound_file(box, sample, arguments):
 
 
 def resumed(box):
-    """Of a killed run: --resume goes on with what is left, or refuses."""
+    """After a killed run --resume goes on with what is left, or refuses."""
     if box.run("run", "case.toml", "--quiet", "--resume", statuses=(0, 2)).status == 0:
         last = box.run("show", "case.hdf", "--csv", statuses=(0,)).out.splitlines()[-1]
         if float(last.split(",")[0]) != 0.2:

@@ -111,7 +111,7 @@ def ended(process, limit):
 
 
 def processor_seconds(pid):
-    """Of a process and of its children that have ended."""
+    """CPU seconds of a process and of its children that have ended."""
     try:
         with open(f"/proc/{pid}/stat", encoding="utf-8") as file:
             fields = file.read().rpartition(")")[2].split()

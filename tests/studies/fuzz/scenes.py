@@ -235,7 +235,7 @@ class Run:
 
 
 def bound(seconds):
-    """Of a processor, so that other work on the machine changes no outcome."""
+    """Limits CPU seconds, so that other work on the machine changes no outcome."""
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
 
 
@@ -258,7 +258,7 @@ class Reference:
         return self.runs[level]
 
     def error(self, run):
-        """Of a run, relative to E_ref, and how far that may be off; None where the references know nothing."""
+        """The error of a run over E_ref, and how far that may be off; None where the references know nothing."""
         times = [0.0, *self.case["time"]["output"], self.case["time"]["end"]]
         first = self.run(0)
         if first.finished:

@@ -66,7 +66,7 @@ class Unpacked(unittest.TestCase):
         self.assertFalse([text for text in headers if re.search(r"experimental/simd|immintrin|__AVX", text)])
 
     def test_old_processors(self):
-        """Of 2003 (SSE2) and 2008 (SSE4.2); both use the baseline, with the result that the other variant has."""
+        """Processors of 2003 (SSE2) and 2008 (SSE4.2) use the baseline; its result is that of the other variant."""
         emulator = shutil.which("qemu-x86_64")
         if not emulator:
             self.skipTest("there is no qemu-x86_64: package qemu-user")

@@ -36,7 +36,7 @@ EIGENVALUES = [0.5] + 2 * [1.1012906853950766] + 4 * [1.6979133966272275]
 
 
 def measured(jobs, folder):
-    """Of each job the CPU seconds of its runs, and what the last of them found."""
+    """For each job the CPU seconds of its runs, and what the last of them found."""
     seconds, found, draw = defaultdict(list), {}, random.Random(1)
     for repetition in range(3):
         order = [job for job in range(len(jobs)) if not (repetition and seconds[job][0] > 5)]
@@ -100,7 +100,7 @@ def best(rows, problem, program, target):
 
 
 def smallest(rows, problem, program):
-    """Of the finest run of each series: on the way to it, errors pass through zero."""
+    """The smallest error of the finest runs of all series: on the way to these, errors pass through zero."""
     return min((abs(run[-1]["error"]) for run in series_of(rows, problem, program)), default=inf)
 
 
@@ -113,7 +113,7 @@ def print_table(rows, problem):
 
 
 def check_claims(rows):
-    """Of docs/other_programs.md. Times are compared where they differ by a factor of two or more."""
+    """What docs/other_programs.md says. Times are compared where they differ by a factor of two or more."""
     for (problem, program, series), run in by_series(rows).items():
         if series == runs.GIVEN and problem.startswith("vesicle"):
             assert all(abs(row["error"]) < (1e-4 if row["size"] < 600 else 2e-6) for row in run[1:]), run

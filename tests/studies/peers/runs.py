@@ -54,7 +54,7 @@ def of_tubule(program, tier, text, key):
 
 
 def spectrum(program, text):
-    """Of tier axisym: the seven lowest eigenvalues, those of m > 0 twice."""
+    """The seven lowest eigenvalues in tier axisym, those of m > 0 twice."""
 
     def run(folder):
         (folder / "case.toml").write_text(f'tier = "axisym"\nenergy.k20 = 0.25\n{text}')
@@ -87,7 +87,7 @@ def vesicles(tubule, v):
 
 
 def tori(tubule):
-    """Of Evolver the area is held: otherwise the energy keeps falling by growth."""
+    """In Evolver the area is held: otherwise the energy keeps falling by growth."""
     for method, levels in ((AREA, 4), (PERP, 3)):
         yield from ((SURFACE, method, of_evolver(evolver.torus, method, 12, k)) for k in range(levels))
     for n in (12, 24, 48):

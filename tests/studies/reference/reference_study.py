@@ -98,7 +98,7 @@ def cells():
 
 
 def tori():
-    """Of area 4 pi: round ones in closed form, theory.md (7.1), and those at rest that have their volume."""
+    """Tori of area 4 pi: round ones in closed form, theory.md (7.1), and those at rest that have their volume."""
     for ratio in (2**0.5, 2.0, 3.0):
         a = 1 / np.sqrt(np.pi * ratio)  # radius of the tube
         R, volume, t = ratio * a, 2 * np.pi**2 * ratio * a**3, np.linspace(0, 2 * np.pi, 400)

@@ -139,7 +139,7 @@ class Result:
 
     @property
     def parameter_unit(self):
-        """Of the parameter of its branch."""
+        """That of the parameter of its branch."""
         return self.unit(self.dimensions.get("parameter", ""))
 
     @property

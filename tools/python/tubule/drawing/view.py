@@ -178,7 +178,7 @@ def drawn_lines(part):
                for handle in scan.draw_map(part, "outcome", panel) if hasattr(handle, "get_color")]  # fmt: skip
 
     def label(*look):
-        """Of equal ones, such as closed forms, the legend has the order in which they are drawn."""
+        """Equal ones, such as closed forms, stand in the legend in the order in which they are drawn."""
         found = next((handle for handle in handles if handle[1:] == look), None)
         if found:
             handles.remove(found)
