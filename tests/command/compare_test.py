@@ -40,6 +40,12 @@ end = 1.0
 output = [0.5]
 """
 
+UNITS = """[units]
+length = "50 nm"
+bending_rigidity = "20 kT"
+friction = "2e4 Pa s/m"
+"""
+
 
 class Compare(ProgramTest):
     def made(self, name, text, *options):
@@ -59,8 +65,8 @@ class Compare(ProgramTest):
 class Runs(Compare):
     def setUp(self):
         super().setUp()
-        self.coarse = self.made("coarse", QUICK, "--set", "accuracy.energy=1e-3")
-        self.fine = self.made("fine", QUICK)
+        self.coarse = self.made("coarse", QUICK + UNITS, "--set", "accuracy.energy=1e-3")
+        self.fine = self.made("fine", QUICK + UNITS)
 
     def test_two_accuracies(self):
         """Each run meets its stated error: beyond interpolation the two differ by no more than the sum of both."""
@@ -142,7 +148,7 @@ class Runs(Compare):
     def test_picture(self):
         self.tubule("compare", self.coarse, self.fine, "--plot", "picture.svg", "--tolerance", "energy=1e-3")
         picture = (self.folder / "picture.svg").read_text()
-        for words in ("A: coarse.hdf", "B: fine.hdf", "rate dE/dt", "shape, Hausdorff", "tolerance"):
+        for words in ("A: coarse.hdf", "B: fine.hdf", "rate dE/dt", "shape, Hausdorff", "tolerance", "time t [\u00b5s]", "energy E [kT]"):
             self.assertIn(words, picture)
         self.assertIn("picture.jpg", self.tubule("compare", self.coarse, self.fine, "--plot", "picture.jpg", status=2)[1])
 

@@ -166,12 +166,12 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(process.returncode, status, f"tubule {arguments}\n{out}{err}")
         return out, err
 
-    def plot(self, *arguments, status=0):
+    def plot(self, *arguments, status=0, command="plot"):
         """What `tubule plot` does, in a fork that need not import its libraries; what it printed on stdout, on stderr."""
         import scripts
 
         with contextlib.chdir(self.folder):
-            done = scripts.run_script(ROOT / "tools/python/tubule/drawing", "plot", *arguments)
+            done = scripts.run_script(ROOT / "tools/python/tubule/drawing", command, *arguments)
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done.stdout, done.stderr
 

@@ -8,6 +8,8 @@ import os
 import re
 import unittest
 
+import h5py
+import numpy as np
 import schema
 from program import CAPSULE, PROGRAM, QUICK, ROOT, ProgramTest, series
 
@@ -137,9 +139,40 @@ class Units(ProgramTest):
             for word in words:
                 self.assertIn(word, [text.strip() for text in texts])
             self.assertNotIn(never, texts)
+        self.plot("case.hdf", "-o", "p.html", command="view")
+        page = json.loads(re.search(r'application/json">(.*?)</script>', (self.folder / "p.html").read_text())[1])
+        found = series(self.result)
+        np.testing.assert_allclose(page["series"]["energy"], 20 * found["energy"])
+        self.assertAlmostEqual(page["high"][1] - page["low"][1], 150)  # the length of the tube is 3
+        self.assertEqual([page["units"][name] for name in ("time", "energy", "area")], ["\u00b5s", "kT", "nm\u00b2"])
+        self.assertEqual((page["length_unit"], page["fields"][0]["unit"]), ("nm", "1/nm"))
         self.write("other.toml", QUICK)
         self.tubule("run", "other.toml")
         self.assertIn("have different units; --units none", self.plot("case.hdf", "other.hdf", "-o", "q.svg", status=2)[1])
+
+    def test_scans(self):
+        """Numbers of axes and points; energies have no unit where the bending rigidity varies, which is their unit."""
+        os.environ["TUBULE_PROGRAM"] = PROGRAM
+        self.addCleanup(os.environ.pop, "TUBULE_PROGRAM")
+        for name, over, words, never in (
+            ("a", ("model.tension=0,0.1", "shape.mode.0.amplitude=0.1,0.2"),
+             ("amplitude A [nm]", "tension \u03c3 [\u00b5N/m]", "energy where the run stopped [kT]"), "energy where the run stopped"),
+            ("b", ("energy.k20=0.5,0.6", "shape.length=2,2.5"),
+             ("length L [nm]", "k\u2082\u2080", "energy where the run stopped"), "energy where the run stopped [kT]"),
+        ):  # fmt: skip
+            self.tubule("scan", "case.toml", "--quiet", *GRADIENT_FLOW, *(word for one in over for word in ("--over", one)), "-o", f"{name}.hdf")
+            self.plot(f"{name}.hdf", "--quantity", "energy", "-o", "p.svg")
+            texts = [text.strip() for text in re.findall(r"<text[^>]*>([^<]*)</text>", (self.folder / "p.svg").read_text())]
+            self.assertLessEqual(set(words), set(texts))
+            self.assertNotIn(never, texts)
+        self.plot("a.hdf", "-o", "p.html", command="view")
+        page = json.loads(re.search(r'application/json">(.*?)</script>', (self.folder / "p.html").read_text())[1])
+        np.testing.assert_allclose(page["axes"][1]["values"], [5, 10])
+        self.assertEqual((page["axes"][1]["texts"], page["units"]["r_min"]), (["0.1", "0.2"], "nm"))
+        with h5py.File(self.folder / "a.hdf") as file:
+            np.testing.assert_allclose(page["slices"][""]["points"]["energy"], 20 * file["points/energy"][()].ravel())
+        self.plot("a.hdf", "--units", "none", "-o", "p.svg")
+        self.assertIn(">amplitude A<", (self.folder / "p.svg").read_text())
 
 
 if __name__ == "__main__":

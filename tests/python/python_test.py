@@ -663,6 +663,8 @@ class Drawing(Folder):
         scan = tubule.scan(TUBE, {"energy.k42": [0, 0.1]}, output=self.folder / "scan.hdf")
         tubule.draw(scan, self.folder / "scan.svg")
         self.assertIn("energy", (self.folder / "scan.svg").read_text())
+        axes = tubule.draw(scan, units="length=50 nm,bending_rigidity=20 kT").axes[0]
+        self.assertEqual(axes.get_ylabel(), "energy where the run stopped [kT]")
         with self.assertRaisesRegex(ValueError, "has no file"):
             tubule.draw(tubule.scan(TUBE, {"energy.k42": [0]}))
 

@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tools/python/tubule"), str(ROOT / "tests/support")]
 import scripts  # noqa: E402
 from browser import Browser as Program  # noqa: E402
-from drawing import scan, surfaces, tubes, view  # noqa: E402
+from drawing import results, scan, surfaces, tubes, view  # noqa: E402
 
 TUBULE = sys.argv[1]
 SCREENSHOTS = Path(sys.argv[sys.argv.index("--screenshots") + 1]) if "--screenshots" in sys.argv else None
@@ -105,7 +105,7 @@ class Pages(unittest.TestCase):
         self.assertIn("<title>$k$ &amp; co</title>", page.read_text())
 
     def test_titles_are_words_whatever_they_are(self):
-        data = view.run_page(made(TUBE)[0])
+        data = view.run_page(results.read_result(str(made(TUBE)[0])))
         parts = ["@DATA@", "@SCRIPT@", "@TITLE@", "<!--", "<script>", "</script>", "-->", "\\u003c", "\\1", "&", "<"]
         rng = random.Random(36)
         for title in (*parts, "<!--<script>", *("".join(rng.choices(parts, k=rng.randint(2, 6))) for _ in range(20))):
@@ -134,7 +134,7 @@ class Pages(unittest.TestCase):
 
     def test_colours_are_those_of_print(self):
         for command in (TUBE, SURFACE):
-            result = view.read_result(str(made(command)[0]))
+            result = results.read_result(str(made(command)[0]))
             if result.surfaces:
                 columns = tubes.choose_columns([result], None, attrgetter("surfaces"))
                 panel = surfaces.SurfacePanel([result], [[""]], columns, ["H", "K"])
@@ -201,7 +201,7 @@ class Pages(unittest.TestCase):
         subprocess.run([TUBULE, "run", "cases/surface_ellipsoid.toml", "--set", "discretisation.elements=320",
                         "--set", "discretisation.order=4", "--quiet", "-o", result], cwd=ROOT, check=True,
                        capture_output=True)  # fmt: skip
-        read = view.read_result(str(result))
+        read = results.read_result(str(result))
         shape = view.Shape(read.surfaces[-1])
         self.assertGreaterEqual(len(shape.cells), 300)
         shape.u = np.random.default_rng(1).normal(size=shape.points.shape)  # as of a fluid

@@ -82,8 +82,8 @@ int wait_for(const std::string& subcommand, std::vector<std::string> command, st
     return WIFEXITED(status) ? WEXITSTATUS(status) : no_picture;
 }
 
-// The beginning of a command line that runs the script. Throws std::runtime_error in the name of the subcommand if
-// Python or the script are missing.
+// The beginning of a command line that runs the script, which may call this program. Throws std::runtime_error in the
+// name of the subcommand if Python or the script are missing.
 std::vector<std::string> plot_command(const std::string& subcommand, const std::string& script) {
     if (access(python, X_OK) != 0)
         throw std::runtime_error(fmt::format(
@@ -93,6 +93,7 @@ std::vector<std::string> plot_command(const std::string& subcommand, const std::
         throw std::runtime_error(fmt::format(
             "tubule {}: its script {}.py is not in {}; install the package python3-tubule, or build tubule again",
             subcommand, script, folder.string()));
+    setenv("TUBULE_PROGRAM", std::filesystem::read_symlink("/proc/self/exe").c_str(), 1);
     return {python, "-B", folder, script};
 }
 
@@ -102,7 +103,6 @@ int become(const std::string& subcommand, std::vector<std::string> command) {
     for (std::string& argument : command) argv.push_back(argument.data());
     argv.push_back(nullptr);
     std::fflush(nullptr);
-    setenv("TUBULE_PROGRAM", std::filesystem::read_symlink("/proc/self/exe").c_str(), 1);
     const Withheld interrupts;
     execv(argv[0], argv.data());
     say(stderr, "tubule {}: cannot start {}: {}\n", subcommand, command[0], std::strerror(errno));

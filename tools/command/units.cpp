@@ -17,6 +17,7 @@
 #include "tools/command/options.hpp"
 #include "tools/command/output.hpp"
 #include "tools/run/continuation.hpp"
+#include "tools/scan/scan_file.hpp"
 
 namespace tubule {
 
@@ -66,7 +67,12 @@ Case case_of(const UnitsOptions& o) {
     if (!is_hdf5(o.file)) return read_case(o.file, o.sets);
     CaseText text;
     try {
-        text = read_case_text(o.file);
+        if (is_scan(o.file)) {
+            const Scan scan = read_scan_result(o.file).scan;
+            text = {scan.case_text, scan.sets, scan.inputs};
+        } else {
+            text = read_case_text(o.file);
+        }
     } catch (const std::runtime_error& error) {
         throw CaseError(explanation(error));
     }

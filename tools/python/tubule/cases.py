@@ -169,5 +169,10 @@ def _sets(values: Mapping[str, Any]) -> list[bytes]:
     return [f"{key}={toml_value(value)}".encode() for key, value in as_mapping("set", values).items()]
 
 
+def case_with_units(text: str, sets: list, path: str, units: str) -> Case:
+    """A case with changes of its table [units]: "length=50 nm,bending_rigidity=20 kT"."""
+    return Case._parsed(text, [*sets, *(f"units.{part}" for part in units.split(",") if part)], path)
+
+
 def as_case(case) -> Case:
     return case if isinstance(case, Case) else Case(case)

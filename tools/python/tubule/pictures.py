@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import os
 import re
 import reprlib
 from collections.abc import Iterable
+from contextlib import contextmanager
 
-from .cases import file_name
+from .cases import case_with_units, file_name
 from .commands import Scan
 from .results import Result, read
 
@@ -41,30 +41,26 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
     import matplotlib
 
     from .drawing import command_line, plot, scan, style
-    from .drawing.results import BadInput, read_result
-    from .drawing.units import convert
 
     outputs = [file_name(path) for path in ([output] if isinstance(output, (str, os.PathLike)) else output or [])]
     words = [f"--kind={kind}", f"--colour={','.join(colour)}", f"--scale={scale}", f"--plane={plane[0]}={float(plane[1])!r}", f"--x={x}",
              f"--camera={float(camera[0])!r},{float(camera[1])!r}", f"--width={float(width)!r}", f"--units={units}",
-             f"--times={','.join('end' if time == float('inf') else repr(float(time)) for time in times)}", f"--series={','.join(series)}", *(f"--label={label}" for label in labels)]  # fmt: skip
-    try:
+             f"--times={','.join('end' if time == float('inf') else repr(float(time)) for time in times)}",
+             f"--series={','.join(series)}", *(f"--label={label}" for label in labels)]  # fmt: skip
+    with _errors(command_line):
         options = command_line.plot_options([*words, *["--logx"] * bool(logx), *["--logy"] * bool(logy), "result"])
         style.check_outputs(outputs)
         with matplotlib.rc_context(style.SETTINGS), style.page(dpi, options.width):
             file = _scan_file(what)
             if file is not None:
-                figure = scan.figure_of(file, quantity, list(slices))
+                figure = scan.figure_of(_scan_in(file, units), quantity, list(slices))
             else:
                 if quantity or slices:
-                    raise BadInput("--quantity and --slices belong to scans, and this is none")
+                    raise command_line.BadInput("--quantity and --slices belong to scans, and this is none")
                 results = [each if isinstance(each, Result) else read(each) for each in _listed(what)]
-                read_ones = [read_result(io.BytesIO(result._core.image()), result._name) for result in results]
-                figure = plot.figure_of([convert(one, _units(result, units)) for one, result in zip(read_ones, results)], options)
+                figure = plot.figure_of([result._shown(units) for result in results], options)
             style.save(figure, outputs)
             return figure
-    except (BadInput, ValueError) as error:
-        raise ValueError(re.sub("--(?=[a-z])", "", str(error)).removeprefix("tubule plot: ")) from None
 
 
 def film(result: Result, output: str | os.PathLike, *, colour: str = "H", fps: float = 10) -> None:
@@ -77,25 +73,36 @@ def film(result: Result, output: str | os.PathLike, *, colour: str = "H", fps: f
     import matplotlib
 
     from .drawing import command_line, movie, style
-    from .drawing.results import read_result
-    from .drawing.units import convert
 
     if not isinstance(result, Result):
         raise TypeError(f"a result is wanted, not {reprlib.repr(result)}: read() gives that of a file")
-    try:
-        shown = convert(read_result(io.BytesIO(result._core.image()), result._name), _units(result, ""))
+    with _errors(command_line):
+        shown = result._shown()
         options = command_line.plot_options([f"--colour={colour}", f"--fps={float(fps)!r}", "result"])
         with matplotlib.rc_context(style.SETTINGS):
             movie.draw(shown, shown.surfaces or shown.frames, file_name(output), options.colour[0], shown.title, options.fps, options.camera)
+
+
+@contextmanager
+def _errors(command_line):
+    """Words of the command in the terms of functions."""
+    try:
+        yield
     except command_line.Unavailable as error:
         raise RuntimeError(str(error)) from None
-    except command_line.BadInput as error:
+    except (command_line.BadInput, ValueError) as error:
         raise ValueError(re.sub("--(?=[a-z])", "", str(error)).removeprefix("tubule plot: ")) from None
 
 
-def _units(result: Result, units: str) -> dict:
-    changes = dict(part.split("=", 1) for part in units.split(",")) if units not in ("", "none") else {}
-    return {} if units == "none" else result.case.with_({f"units.{key}": value for key, value in changes.items()}).units
+def _scan_in(file: str, units: str):
+    """As the drawing code reads it, in these units."""
+    from .drawing import scan
+    from .drawing.units import are_wanted
+
+    found = scan.Scan(file)
+    if not are_wanted(units, found.has_units):
+        return found
+    return found.convert(lambda sets: case_with_units(found.text, [*found.sets, *sets], file, units).units)
 
 
 def _listed(what) -> list:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import html
+import io
 import operator
 import os
 import tempfile
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from .cases import Case, file_name
+from .cases import Case, case_with_units, file_name
 from .drawing import triangles
 
 
@@ -215,6 +216,17 @@ class Result:
         unit = self.units.get(self._core.dimensions(name), {"scale": 1.0, "unit": ""})
         return self.series[name] * unit["scale"], unit["unit"]
 
+    def _shown(self, units: str = ""):
+        """As the drawing code reads it, in other units than those of its case where they are given."""
+        from .drawing.results import read_result
+        from .drawing.units import convert
+
+        found = read_result(io.BytesIO(self._core.image()), self._name)
+        if units == "none":
+            return found
+        case = self.case
+        return convert(found, case_with_units(case._core.text, case._core.sets, self._name, units).units)
+
     def __reduce__(self):
         return _from_image, (self._core.image(), self._name)
 
@@ -236,11 +248,7 @@ class Result:
             command_line.require_libraries("the page of a result")
             from .drawing import view
 
-            with tempfile.TemporaryDirectory() as folder:
-                file = os.path.join(folder, os.path.basename(self._name))
-                with open(file, "wb") as out:
-                    out.write(self._core.image())
-                page = view.page_of(view.run_page(file))
+            page = view.page_of(view.run_page(self._shown()))
             return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="600" style="border: 0"></iframe>'
         except (command_line.Unavailable, command_line.BadInput) as error:
             return f"<p>{html.escape(repr(self))}: {html.escape(str(error))}</p>"

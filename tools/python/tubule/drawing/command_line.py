@@ -200,6 +200,10 @@ class Parser(argparse.ArgumentParser):
         raise BadInput(f"{self.prog}: not expected: {' '.join(words)}{meant}\nRun `{self.prog} --help` for more information.")
 
 
+UNITS = {"type": units, "default": "",
+         "help": "keys of [units], as \"length=50 nm,bending_rigidity=20 kT\", or none (default: those of the case)"}  # fmt: skip
+
+
 def plot():
     parser = Parser(
         "plot", "Draw shapes and cuts through them at the output times, and energies over time",
@@ -230,7 +234,7 @@ def plot():
     option("--slice", action="append", default=[], help="of a scan with more than two axes: key=value of an axis that is cut; may be repeated")
     option("--confirmed", help="of a scan: the output of `tubule confirm --json`, whose points are marked on the map")
     option("--width", type=number(3, 20), metavar="FLOAT", default="7", help="inches of the page; below 5, for a column of a journal, legends and colour bars are below each other")
-    option("--units", type=units, default="", help="keys of [units], as \"length=50 nm,bending_rigidity=20 kT\", or none (default: those of the case)")
+    option("--units", **UNITS)
     option("--dpi", type=number(30, 1200), metavar="FLOAT", default="300", help="pixels per inch of a .png, and of surfaces within .svg and .pdf")
     option("--movie", help="film to write instead, .mp4 (needs ffmpeg) or .gif: the shape of one result, frame by frame, "
                            "coloured by H or the given --colour, and its energy")  # fmt: skip
@@ -244,6 +248,7 @@ def view():
         ("figure.hdf",), {4: "the page could not be made"}, "pictures")  # fmt: skip
     parser.option("result", metavar="RESULT", help="result of run, equilibrium or scan")
     parser.option("-o", "--output", type=file_name, help="page to write (default: RESULT.html)")
+    parser.option("--units", **UNITS)
     return parser
 
 

@@ -162,9 +162,10 @@ def draw_any(options, outputs):
                 raise BadInput(f"{options.results[0]}: is no scan, to which --{option} belongs")
         style.save(figure_of([units.read(path, options.units) for path in options.results], options), outputs)
         return
-    if len(options.results) > 1 or options.times or options.colour or options.kind != ["all"] or options.series or options.units:
-        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind, --series and --units")
-    style.save(scan.figure_of(options.results[0], options.quantity, options.slice, options.confirmed), outputs)
+    if len(options.results) > 1 or options.times or options.colour or options.kind != ["all"] or options.series:
+        raise BadInput(f"{options.results[0]}: a scan is drawn alone, without --times, --colour, --kind and --series")
+    found = scan.read(options.results[0], options.units)
+    style.save(scan.figure_of(found, options.quantity, options.slice, options.confirmed), outputs)
 
 
 def main(options):

@@ -251,6 +251,12 @@ def read_result(path, name=""):
         return Result(name or path, _case(path, file), about, series_in_time(series), *_frames(path, file), texts["meaning"], labels, texts["unit"])
 
 
+def read_case(path):
+    """The case of a result, as of Result."""
+    with opened(path) as file:
+        return _case(path, file)
+
+
 def _case(path, file):
     """As the program has resolved it: overrides applied, defaults written out. Of an older result the program is asked."""
     program, text = os.environ.get("TUBULE_PROGRAM"), ""

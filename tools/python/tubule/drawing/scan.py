@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from . import style
-from .labels import as_label, flatten, formula, number, symbol
+from . import style, units
+from .labels import as_label, flatten, formula, in_unit, number, pretty_unit, symbol
 from .results import BadInput, opened, values
 
-LEFT, BELOW, PANEL, ABOVE, BAR = 0.6, 0.45, 3.3, 0.27, 0.9  # inches: beside and below the axes, their height, title, colour bar
+LEFT, BELOW, PANEL, ABOVE, BAR = 0.6, 0.45, 3.3, 0.27, 1.05  # inches: beside and below the axes, their height, title, colour bar
 # By name of the outcome: light for equilibria, dark for early stops.
 COLOURS = {
     "uniform-tube": "#d6e4f0",
@@ -64,6 +64,12 @@ QUANTITIES = {
     "wall_seconds": "wall time in s",
     "cpu_seconds": "CPU time in s",
 }
+OF_POINTS = {
+    "energy": "energy", "time": "time", "E_ref": "energy", "r_min": "length", "r_max": "length", "area": "length^2",
+    "volume": "length^3", "height": "length", "tension": "energy/length^2", "pressure": "energy/length^3", "growth": "1/time",
+    "free_energy": "energy", "limit_energy": "energy",
+}  # fmt: skip
+UNITS_CHANGE = re.compile(r"(energy\.k20|model\.(kind|Re|gamma)|units\.\w+)=")  # keys that decide what a number stands for
 AT_REST = ("uniform-tube", "unduloid", "sphere", "closed", "prolate", "oblate", "stomatocyte", "pear")
 KNOWN_OF_FAILED = 1e-4  # of E_ref: to this the energy where a search failed is known
 THRESHOLD_DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
@@ -81,13 +87,14 @@ NAMES = {
 }
 
 
+MODE = re.compile(r"shape\.mode\.(\d+)\.amplitude")
 CAPTION = re.compile(r"energy\..*|shape\.(radius|length|a|b|c|mode\..*amplitude)|model\.(kind|tension|pressure|force|Re|gamma)|equilibrium\.(area|volume|reduced_volume)")
 
 
 def name_of(key):
     modulus = re.fullmatch(r"energy\.(k(\d+|g))", key)
-    mode = re.fullmatch(r"shape\.mode\.([1-9]\d*)\.amplitude", key)
-    return symbol(modulus[1]) if modulus else f"amplitude of mode {mode[1]}" if mode else NAMES.get(key, key)
+    mode = MODE.fullmatch(key)
+    return symbol(modulus[1]) if modulus else NAMES.get(key) or (f"amplitude of mode {mode[1]}" if mode else key)
 
 
 def with_sets(case, sets):
@@ -103,21 +110,31 @@ def with_sets(case, sets):
 
 
 class Axis:
+    unit, scale = "", 1.0  # of its values; a number of the file times `scale` is one of them
+
     def __init__(self, group):
-        self.key = ", ".join(group.attrs["keys"])
+        keys = list(group.attrs["keys"])
+        self.key = ", ".join(keys)
         self.logarithmic = bool(group.attrs["logarithmic"])
         numbers = values(group["values"])
-        self.texts = [", ".join(text.decode() for text in row) for row in values(group["texts"])]
+        rows = [[text.decode() for text in row] for row in values(group["texts"])]
+        self.texts = [", ".join(row) for row in rows]
+        self.sets = [[f"{key}={text}" for key, text in zip(keys, row)] for row in rows]  # the overrides of the points there
         self.is_numeric = numbers.shape[1] == 1 and np.isfinite(numbers).all() and (np.diff(numbers[:, 0]) > 0).all()
         self.values = numbers[:, 0] if self.is_numeric else np.arange(len(numbers), dtype=float)
 
     @property
     def label(self):
-        return name_of(self.key)
+        return in_unit(name_of(self.key), self.unit)
 
     def at(self, places):
         """Values at places of older files, which have integers, or the values themselves."""
-        return self.values[places] if places.dtype.kind in "iu" else places
+        return self.values[places] if places.dtype.kind in "iu" else self.scale * places
+
+    def words(self, place):
+        """The key with its value there."""
+        value = f"{number(self.values[place])} {self.unit}" if self.unit else self.texts[place]
+        return f"{self.key} = {value}"
 
     def place(self, value):
         """The place of a value on the axis, given as text; None if it has no such value."""
@@ -127,7 +144,7 @@ class Axis:
             number = float(value)
         except ValueError:
             return None
-        near = np.flatnonzero(np.isclose(self.values, number, rtol=1e-9, atol=0)) if self.is_numeric else []
+        near = np.flatnonzero(np.isclose(self.values, number * self.scale, rtol=1e-9, atol=0)) if self.is_numeric else []
         return int(near[0]) if len(near) else None
 
     def borders(self):
@@ -165,13 +182,52 @@ class Scan:
             self.points = {name: values(data) for name, data in file["points"].items()}
             self.names = list(file["points/outcome"].attrs["names"])
             self.title = file["scan"].attrs["title"]
-            self.case = with_sets(file["case"][()].decode(), file["case"].attrs["set"]) if "set" in file["case"].attrs else {}
+            self.text, self.sets = file["case"][()].decode(), list(file["case"].attrs.get("set", []))
+            self.case = with_sets(self.text, self.sets) if "set" in file["case"].attrs else {}  # of older scans not known
+            self.units = {}  # unit and scale by dimensions; none: all is as in the file
             self.starts = file["scan"].attrs.get("start_axis")  # the axis of initial shapes of an equilibrium, or None
             self.boundary = values(file["boundary"])
             self.crossings = values(file["crossing"]).mean(axis=1) if "crossing" in file else []
             self.thresholds = [(line.attrs["label"], values(line["first"]), values(line["second"]), values(line["values"]))
                                for line in file["thresholds"].values()]  # fmt: skip
             self.equal = {name: values(data) for name, data in file["equal_energies"].items()} if self.starts is not None else {}
+
+    @property
+    def has_units(self):
+        return any(key.startswith("units.") for key in self.case)
+
+    @property
+    def is_equilibrium(self):
+        return "equilibrium" in tomllib.loads(self.text) or any("equilibrium." in axis.key for axis in self.axes)
+
+    def convert(self, units_of):
+        """Changes all numbers to units that all points share; `units_of` has those of the point with these overrides."""
+        first = [one for axis in self.axes for one in axis.sets[0]]
+        shared = units_of(first)
+        for axis in self.axes:
+            changed = axis.sets[1:] if any(map(UNITS_CHANGE.match, axis.sets[0])) else ()
+            for other in (units_of([*first, *sets]) for sets in changed):
+                shared = {of: unit for of, unit in shared.items() if other.get(of) == unit}
+        if self.is_equilibrium:
+            shared.pop("time", None)  # they have none
+        self.units = {of: (pretty_unit(unit["unit"]), unit["scale"]) for of, unit in shared.items()}
+        for axis in self.axes:
+            axis.unit, axis.scale = self.unit_of_key(axis.key)
+            axis.values = axis.values * axis.scale if axis.is_numeric else axis.values
+        self.points |= {name: self.points[name] * self.unit_of(name)[1] for name in OF_POINTS if name in self.points}
+        return self
+
+    def unit_of_key(self, key):
+        """The unit of its values, and what one number of the file is in it."""
+        amplitude = MODE.fullmatch(key) and self.case.get("shape.kind") == "tube"
+        return self.units.get("length" if amplitude else units.OF_KEYS.get(key), ("", 1.0))
+
+    def unit_of(self, quantity):
+        """Likewise of what QUANTITIES lists."""
+        return self.units.get(OF_POINTS.get(quantity), ("", 1.0))
+
+    def label(self, quantity):
+        return in_unit(QUANTITIES.get(quantity, quantity), self.unit_of(quantity)[0])
 
     def caption(self):
         """What all points have in common and the title need not say: moduli that are not zero, sizes, loads."""
@@ -183,7 +239,8 @@ class Scan:
             if isinstance(value, str):
                 words.append(value)
             elif value and not isinstance(value, (bool, list)):
-                words.append(f"{name} = {number(value)}")
+                unit, scale = self.unit_of_key(key)
+                words.append(f"{name} = {number(value * scale)} {unit}".rstrip())
         return words
 
     def places(self, slices):
@@ -261,8 +318,9 @@ class Slice:
         else:
             self.boundary = differing(self.points["outcome"])
         self.caption = scan.caption()
-        where = ", ".join(f"{scan.axes[i].key} = {scan.axes[i].texts[place]}" for i, place in sorted(cut.items()))
+        where = ", ".join(scan.axes[i].words(place) for i, place in sorted(cut.items()))
         self.title = ": ".join(words for words in (scan.title, where) if words)
+        self.label = scan.label
 
     def _lower_states(self):
         """Where spheres joined by points have less energy than any smooth shape found; and where the lowest state is not
@@ -295,7 +353,7 @@ class Slice:
         for ends, axis, kinds, value, lowest in zip(*(scan.equal[name] for name in ("points", "axis", "kinds", "value", "lowest"))):
             if np.isfinite(value):
                 places = [tuple(np.unravel_index(end, shape)[i] for i in kept) for end in ends]
-                self.equal.append((*places, kept.index(axis), value, tuple(kinds), bool(lowest)))
+                self.equal.append((*places, kept.index(axis), scan.axes[axis].at(value), tuple(kinds), bool(lowest)))
 
     @property
     def shape(self):
@@ -314,7 +372,7 @@ def draw_borders(part, panel):
             lines.append([(x[i + 1], y[j]), (x[i + 1], y[j + 1])] if k > i else [(x[i], y[j + 1]), (x[i + 1], y[j + 1])])
         if len(part.crossings):
             value = part.crossings[number]
-            places.append((value, part.axes[1].values[j]) if k > i else (part.axes[0].values[i], value))
+            places.append((part.axes[0].at(value), part.axes[1].values[j]) if k > i else (part.axes[0].values[i], part.axes[1].at(value)))
     panel.add_collection(LineCollection(lines, colors="black", linewidths=0.8))
     handles = draw_equal_energies(part, panel)
     if places:
@@ -363,7 +421,7 @@ def draw_cells(part, quantity, panel):
     mesh = panel.pcolormesh(*(axis.borders() for axis in part.axes), shown.T, rasterized=True, **look)
     if quantity != "outcome":
         bar = panel.inset_axes([1.04, 0, 0.03, 1])
-        panel.figure.colorbar(mesh, cax=bar, label=QUANTITIES[quantity])
+        panel.figure.colorbar(mesh, cax=bar, label=part.label(quantity))
 
 
 def draw_map(part, quantity, panel):
@@ -389,7 +447,7 @@ def draw_line(part, quantity, panel):
                            markeredgecolor="0.3", markeredgewidth=0.4)  # fmt: skip
     for *_, value, _, lowest in part.equal:
         panel.axvline(value, color="black", linewidth=0.8, linestyle="-" if lowest else ":")
-    panel.set(xlabel=part.axes[0].label, ylabel=QUANTITIES[quantity])
+    panel.set(xlabel=part.axes[0].label, ylabel=part.label(quantity))
 
 
 def draw_confirmed(path, part, panel):
@@ -411,9 +469,15 @@ def draw_confirmed(path, part, panel):
     return handles
 
 
-def figure_of(path, quantity="", slices=(), confirmed=None):
-    """The map of a scan file, or curves over its only axis."""
-    part = Slice(Scan(path), slices)
+def read(path, option=""):
+    """The scan in a file, in the units of its case if it has any; `option` as --units."""
+    scan = Scan(path)
+    return scan.convert(lambda sets: units.asked(path, option, sets)) if units.are_wanted(option, scan.has_units) else scan
+
+
+def figure_of(scan, quantity="", slices=(), confirmed=None):
+    """The map of a scan, or curves over its only axis."""
+    path, part = scan.path, Slice(scan, slices)
     if not part.points["outcome"].any():
         raise BadInput(f"{path}: no point is finished yet")
     if quantity and quantity not in QUANTITIES:

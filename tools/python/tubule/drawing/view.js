@@ -29,6 +29,10 @@ function short(x, digits = 6) {
   return text.replace(/-/g, "\u2212").replace(/\.?0*e\+?/, "e");
 }
 
+// A number with the unit that the page has for it, if any.
+function measured(x, unit, digits = 6) { return unit && x !== null ? `${short(x, digits)} ${unit}` : short(x, digits); }
+function labelled(words, unit) { return unit ? `${words} [${unit}]` : words; }
+
 function ends(values) {
   let low = Infinity, high = -Infinity;
   for (const x of values) if (x !== null) low = Math.min(low, x), high = Math.max(high, x);

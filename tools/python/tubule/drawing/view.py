@@ -15,12 +15,12 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize, to_hex
 from matplotlib.figure import Figure
 
-from . import command_line, flow, raster, scan
+from . import command_line, flow, raster, scan, units
 from .colours import Colours
-from .labels import as_label, flatten, symbol
+from .labels import as_label, flatten, in_unit, symbol
 from .movie import shared_colours
 from .raster import lattice
-from .results import BadInput, Surface, opened, read_result
+from .results import BadInput, Surface, opened
 from .tubes import choose_columns
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -83,12 +83,13 @@ def field_colours(name, values, result, printed):
     """As `tubule plot` draws them: the scale of H, K and p is from the frames that it draws, others from all."""
     if name in ("H", "K", "p"):
         return shared_colours(result, printed, name)
+    label = WORDS.get(name, f"normal displacement of mode {name.removeprefix('mode_')}")
+    label = in_unit(label, result.unit(units.OF_FRAMES.get(name)))
     if name == "energy_density":
         low, high = np.percentile(values, [OUTLIERS, 100 - OUTLIERS])
         half = 0.0 if high > low else 0.5
-        return Colours("viridis", Normalize(low - half, high + half), "neither", WORDS[name])
+        return Colours("viridis", Normalize(low - half, high + half), "neither", label)
     largest = float(np.abs(values).max()) or 1.0
-    label = WORDS.get(name, f"normal displacement of mode {name.removeprefix('mode_')}")
     return Colours(flow.VELOCITY, Normalize(-largest, largest), "neither", label)
 
 
@@ -104,6 +105,7 @@ def described_fields(shapes, result, printed):
             "name": name,
             "symbol": SYMBOLS.get(name, name.replace("_", " ")),
             "words": colours.label,
+            "unit": result.unit(units.OF_FRAMES.get(name)),
             "low": float(values.min()),
             "high": float(values.max()),
             "shown": [float(colours.norm.vmin), float(colours.norm.vmax)],
@@ -142,11 +144,11 @@ def ending(about):
     return out, [line for line in str(about.get("warnings", "")).split("\n") if line]
 
 
-def run_page(path):
-    result = read_result(path)
+def run_page(result):
+    """The data of the page of a Result."""
     frames = result.surfaces or result.frames
     if not frames:
-        raise BadInput(f"{path}: no shapes to show")
+        raise BadInput(f"{result.path}: no shapes to show")
     columns = choose_columns([result], None, attrgetter("surfaces" if result.surfaces else "frames"))
     shapes = [Shape(frame) for frame in frames]
     fields = described_fields(shapes, result, [column.cells[0] for column in columns])
@@ -156,7 +158,7 @@ def run_page(path):
     return {
         "kind": "shapes",
         "title": result.title.replace(r"\$", "$"),
-        "file": os.path.basename(path),
+        "file": os.path.basename(result.path),
         "case": [f"{key} = {value}" for key, value in flatten(result.case).items()],
         "about": about,
         "warnings": warnings,
@@ -164,6 +166,8 @@ def run_page(path):
         "along_words": symbol(vary.split(".")[-1]).replace("_", " ") if along == "parameter" else along,
         "series": {name: finite(values) for name, values in result.series.items() if name != "wall_seconds"},
         "meanings": result.meanings,
+        "units": {name: unit for name, of in result.dimensions.items() if (unit := result.unit(of))},
+        "length_unit": result.unit("length"),
         "view": raster.View().axes.T.tolist(),
         "rim": raster.RIM_SHADE,
         "fields": fields,
@@ -216,9 +220,9 @@ def packed_slice(found, cut):
     return part, out | (drawn_lines(part) if len(part.axes) == 2 else {"lines": [], "dots": []})
 
 
-def scan_page(path):
-    found = scan.Scan(path)
-    with opened(path) as file:
+def scan_page(found):
+    """The data of the page of a Scan."""
+    with opened(found.path) as file:
         case = os.path.basename(str(file["scan"].attrs["path"]))
         sets = [str(text) for text in file["case"].attrs.get("set", [])] if "case" in file else []
         stops = list(file["points/stop"].attrs["names"])
@@ -231,8 +235,8 @@ def scan_page(path):
         part, slices[",".join(map(str, picks))] = packed_slice(found, [f"{key}={text}" for key, text in texts if text])
     return {
         "kind": "scan",
-        "title": as_label(found.title).replace(r"\$", "$") or os.path.basename(path),
-        "file": os.path.basename(path),
+        "title": as_label(found.title).replace(r"\$", "$") or os.path.basename(found.path),
+        "file": os.path.basename(found.path),
         "command": ["tubule run " + shlex.quote(case), *(f"--set {shlex.quote(text)}" for text in sets)],
         "axes": [{"key": axis.key, "label": axis.label, "texts": axis.texts, "values": axis.values.tolist(),
                   "borders": axis.borders().tolist(), "logarithmic": axis.logarithmic,
@@ -240,7 +244,8 @@ def scan_page(path):
         "choices": [{"key": found.axes[i].key, "label": found.axes[i].label, "texts": texts,
                      "starts": bool(i == found.starts)} for i, texts in zip(chosen, options)],
         "names": {"outcome": found.names, "stop": stops},
-        "quantities": {name: scan.QUANTITIES.get(name, name) for name in numbers_of(part)},
+        "quantities": {name: found.label(name) for name in numbers_of(part)},
+        "units": {name: unit for name in numbers_of(part) if (unit := found.unit_of(name)[0])},
         "outcome_colours": [scan.COLOURS.get(name, "#ffffff") for name in found.names],
         "colours": colour_table("viridis"),
         "slices": slices,
@@ -263,10 +268,11 @@ def page_of(data):
     return re.sub(f"@({'|'.join(parts)})@", lambda place: parts[place[1]], text("view.html"))
 
 
-def write(path, output):
+def write(path, output, option=""):
+    """The page of a result or a scan; `option` as --units."""
     if not output.endswith((".html", ".htm")):
         raise BadInput(f"{output}: must end in .html")
-    page = page_of(scan_page(path) if scan.is_scan(path) else run_page(path))
+    page = page_of(scan_page(scan.read(path, option)) if scan.is_scan(path) else run_page(units.read(path, option)))
     try:
         with open(output, "w", encoding="utf-8") as file:
             file.write(page)
@@ -276,6 +282,6 @@ def write(path, output):
 
 def main(options):
     output = options.output or os.path.splitext(options.result)[0] + ".html"
-    write(options.result, output)
+    write(options.result, output, options.units)
     command_line.say(output, sys.stdout)
     return 0

@@ -35,7 +35,7 @@ class Slice {
 }
 
 function worded(name, value) {
-  return value !== null && data.names[name] ? data.names[name][value] : short(value);
+  return value !== null && data.names[name] ? data.names[name][value] : measured(value, data.units[name]);
 }
 
 function hatch(c, x, y, width, height, crossed) {
@@ -178,7 +178,7 @@ function words_of(slice, k) {
   const names = Object.keys(data.quantities), message = slice.home(k).messages[k];
   const values = names.map(name => `${name}: ${worded(name, slice.value(name, k))}`), hatched = slice.hatched(k);
   const family = ([text, {outcome, free_energy}]) =>
-    `from ${text}: ${worded("outcome", outcome[k])}, energy ${short(free_energy[k])}`;
+    `from ${text}: ${worded("outcome", outcome[k])}, energy ${worded("free_energy", free_energy[k])}`;
   const others = slice.starts ? slice.families().map(family) : [];
   const about = [...(hatched ? [hatched] : []), ...(message ? [`message: ${message}`] : []), ...values];
   const command = [...data.command, ...slice.sets(k).map(set => `--set ${quoted(set)}`)].join(" ");

@@ -27,8 +27,9 @@ class SeriesChart {
     this.points = rows.filter(row => row.y !== null && row.y !== undefined);
     const [low, high] = ends(this.points.map(p => p.y)), log_y = upright && low > 0;
     const rim = log_y ? 0 : 0.04 * (high - low);
-    this.x = new Axis(ends(this.points.map(p => p.x)), data.along_words, log_x);
-    this.y = new Axis([low - rim, high + rim], name.replace(/_/g, " "), log_y);
+    this.x = new Axis(ends(this.points.map(p => p.x)), labelled(data.along_words, data.units[data.along]), log_x);
+    this.words = name.replace(/_/g, " ");
+    this.y = new Axis([low - rim, high + rim], labelled(this.words, data.units[name]), log_y);
     const times = this.points.map(p => p.time), row = frame => this.points[nearest_of(times, frame.time)];
     this.frames = times.length ? data.frames.map((frame, number) => ({...row(frame), number})) : [];
     this.name = name;
@@ -52,12 +53,15 @@ class SeriesChart {
     const {x, y} = this.near;
     c.fillStyle = c.strokeStyle = "#222", c.setLineDash([3, 3]);
     line(c, px(x), top, px(x), bottom), dot(c, px(x), py(y), 3);
-    const words = `${data.along_words} ${short(x)}, ${this.y.label} ${short(y, 8)}`;
+    const words = `${along_value(x)}, ${this.words} ${measured(y, data.units[this.name], 8)}`;
     c.fillStyle = "#fffd", c.fillRect(left + 4, top + 4, c.measureText(words).width + 8, 18);
     c.fillStyle = "#222", c.textAlign = "left", c.fillText(words, left + 8, top + 17);
     this.canvas.dataset.near = words;
   }
 }
+
+// Time or the parameter of a branch.
+function along_value(x) { return `${data.along_words} ${measured(x, data.units[data.along])}`; }
 
 // The colour bar and a scale bar of a round length, below the body.
 function draw_over(canvas, field, per_unit, words) {
@@ -66,7 +70,7 @@ function draw_over(canvas, field, per_unit, words) {
   draw_bar(c, 28, height - 34, Math.min(360, (narrow ? 0.58 : 0.5) * width), field);
   const right = width - 16, left = right - length * per_unit, y = height - 29;
   c.strokeStyle = c.fillStyle = "#222", c.lineWidth = 2, line(c, left, y, right, y);
-  c.textAlign = "center", c.fillText(short(length), (left + right) / 2, y - 7);
+  c.textAlign = "center", c.fillText(measured(length, data.length_unit), (left + right) / 2, y - 7);
   c.textAlign = "left", c.fillText(words, 12, 20);
   canvas.dataset.bar = `${length} ${right - left}`;
 }
@@ -82,13 +86,14 @@ function describe_run(home) {
 }
 
 // Where the pointer is on the surface, and the value there.
-function show_tip(tip, found, where, symbol) {
+function show_tip(tip, found, where, {symbol, unit}) {
   tip.hidden = !found;
   if (!found) return;
   const [x, y, z] = found.point, profile = data.low.length === 2;
   const words = profile ? [["r", Math.hypot(x, y)], ["z", z]] : [["x", x], ["y", y], ["z", z]];
-  const named = ([name, value]) => `${name} = ${short(value, 4)}`;
-  tip.textContent = `${named([symbol, found.value])}\n${words.map(named).join(", ")}`;
+  const named = (name, value, unit) => `${name} = ${measured(value, unit, 4)}`;
+  const position = words.map(([name, value]) => named(name, value, data.length_unit)).join(", ");
+  tip.textContent = `${named(symbol, found.value, unit)}\n${position}`;
   tip.style.left = `${Math.max(0, Math.min(where[0] + 14, tip.parentNode.clientWidth - tip.offsetWidth))}px`;
   tip.style.top = `${Math.max(0, where[1] - 44)}px`;
 }
@@ -125,10 +130,10 @@ function show_shapes() {
   const over = element("canvas", {id: "over"}, home);
   const tip = element("div", {id: "tip", hidden: true}, home), chosen = controls(side, () => draw());
   const field = () => data.fields.find(f => f.name === chosen.colour.value), number = () => Number(chosen.slider.value);
-  const body = new Body(body_canvas, 62, (found, where) => show_tip(tip, found, where, field().symbol), () => turned());
+  const body = new Body(body_canvas, 62, (found, where) => show_tip(tip, found, where, field()), () => turned());
   const missing = "The surface cannot be drawn: this browser has no WebGL 2, or it is switched off.";
   if (!body.gl) element("div", {className: "missing", textContent: missing}, home);
-  at("note").textContent = `Positions are rounded to ${short(data.rounding, 2)}. Drag to turn, with Shift or two ` +
+  at("note").textContent = `Positions are rounded to ${measured(data.rounding, data.length_unit, 2)}. Drag to turn, with Shift or two ` +
     "fingers to move; scroll or pinch to zoom; click the chart to go there.";
   const wanted = Number(location.hash.slice(1)) || 1;  // page.html#3 begins with frame 3
   chosen.slider.value = Math.min(wanted, data.frames.length) - 1;
@@ -146,8 +151,8 @@ function show_shapes() {
   const which_frame = () => `frame ${number() + 1} of ${data.frames.length}`;
   function turned() {
     body.draw();
-    const now = short(value(data.frames[number()]));
-    draw_over(over, field(), body.per_unit, `${data.along_words} ${now}, ${which_frame()}`);
+    const now = along_value(value(data.frames[number()]));
+    draw_over(over, field(), body.per_unit, `${now}, ${which_frame()}`);
   }
   function draw() {
     const frame = data.frames[number()], copies = chosen.copies.checked ? 3 : 1;
