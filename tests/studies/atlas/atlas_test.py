@@ -63,7 +63,7 @@ class Corners(unittest.TestCase):
         page.write_text("# Page\n\n<!-- counts -->\nearlier\n<!-- end -->\n\n<!-- silent -->\n<!-- end -->\nlast\n")
         subprocess.run([HERE / "page.py", self.folder, page], check=True)
         text = page.read_text()
-        self.assertIn("\n| `k40` | axisym | 4 | 4 |  |  |  |  |\n", text)
+        self.assertIn("\n| `k40` | axisym | 169 | 4 |  |  |  | 165 |\n", text)  # all but four points of its lattice are missing
         self.assertNotIn("earlier", text)
         self.assertTrue(text.endswith("last\n"))
         page.write_text("# Page\n")

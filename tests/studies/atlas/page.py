@@ -10,21 +10,29 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fuzz"))
 from judging import KINDS  # noqa: E402
-from lattice import read_table  # noqa: E402
+from lattice import FINEST, read_table  # noqa: E402
 from maps import MAPS  # noqa: E402
 
 
 def counts(tables):
-    yield "| map | tier | judged | " + " | ".join(KINDS) + " |"
+    yield "| map | tier | points | " + " | ".join(KINDS) + " |"
     yield "|---" * (3 + len(KINDS)) + "|"
     for tier in sorted({MAPS[name].tier for name in tables}):
         total = collections.Counter()
         for name, rows in tables.items():
             if MAPS[name].tier == tier:
                 found = collections.Counter(row["kind"] for row in rows)
+                found["undecided"] += missing(MAPS[name], rows)
                 total += found
                 yield line(f"`{name}`", tier, found)
         yield line("**all**", tier, total)
+
+
+def missing(chart, rows):
+    """The points of the coarse lattice without a row: they exceeded the time."""
+    judged = {(row["variant"], int(row["i"]), int(row["j"])) for row in rows}
+    places = range(0, FINEST * chart.across + 1, FINEST)
+    return sum((variant, i, j) not in judged for variant in chart.variants for i in places for j in places)
 
 
 def line(name, tier, found):
