@@ -1,9 +1,16 @@
 #include "axisym/curve/coarser_curve.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace tubule::axisym {
 namespace {
+
+// Measured choices: docs/decisions/curves.md, "How large is the error of a curve in motion?".
+constexpr double start_steps = 40;                 // over which steps grow where the integrator begins
+constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
+constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
+constexpr int few_steps = 8;
 
 const std::string prefix = "restart_coarser_";
 
@@ -23,6 +30,13 @@ bool continues(const Saved& s, const TimeSpan& time) {
     const auto stop = static_cast<Stop>(s.stop);
     if (stop == Stop::finished) return s.stop_time < time.end * (1 - 1e-12);
     return stop == Stop::stationary && (s.end != time.end || s.stationary != time.stationary.value_or(0));
+}
+
+// Number of starts of the integrator until t: the first one, and one at each kink of the loads.
+int beginnings(const MotionLaw& law, double t) {
+    int count = 1;
+    for (double kink = next_kink(law, 0); kink < t; kink = next_kink(law, kink)) ++count;
+    return count;
 }
 
 RunObserver nobody;  // who sees its rows; pauses come from the clock
@@ -73,6 +87,25 @@ void CoarserCurve::save(Record& record) const {
 
 void CoarserCurve::lead_to(double t) {
     while (loop_ && !loop_->stop() && run_->time() < t) loop_->step();
+}
+
+// The error is share(t) times the difference of the pair. Steps that only grow are alike in both runs and show nothing:
+// 40/steps, within 0.2 to 1. If the tolerance limited clearly fewer steps of the finer run, both share the errors of
+// the growing steps, which an instability may amplify: 3. With sources, which do not let errors be forgotten: 1.
+double CoarserCurve::share(const EnergyTrace& trace, const CurveSettings& settings, double t) const {
+    const int own = trace.limited_steps(step_growth_of(settings), t),
+              other = run_->trace.limited_steps(step_growth_of(coarser(settings)), t);
+    if (other >= few_steps && own < alike * other) return share_if_alike;
+    if (case_.law.source.act()) return 1;
+    const double growing = start_steps * beginnings(case_.law, t);
+    return std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
+}
+
+std::optional<double> CoarserCurve::error_of(const EnergyTrace& trace, const CurveSettings& settings, double t,
+                                             double energy) const {
+    const std::optional<double> difference = run_->trace.difference(t, energy);
+    if (!difference) return std::nullopt;
+    return share(trace, settings, t) * *difference;
 }
 
 }  // namespace tubule::axisym

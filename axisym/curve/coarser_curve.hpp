@@ -22,11 +22,15 @@ public:
     // Until its time is at least this, or it ends.
     void lead_to(double t);
 
-    const EnergyTrace& trace() const { return run_->trace; }
+    // The error of a run of this trace and these settings, whose free energy at the time t is this, by the difference.
+    std::optional<double> error_of(const EnergyTrace& trace, const CurveSettings& settings, double t,
+                                   double energy) const;
     double least_symbol() const { return run_->least_symbol; }
     std::optional<StopReport> stop() const { return loop_ ? loop_->stop() : run_->summary.stop; }
 
 private:
+    double share(const EnergyTrace& trace, const CurveSettings& settings, double t) const;
+
     const Problem& case_;
     std::unique_ptr<CurveSimulation> run_;
     std::optional<Loop> loop_;  // none: the run has ended before this pair

@@ -15,12 +15,8 @@ namespace {
 
 constexpr int steps_between_looks = 10;
 // Measured choices: docs/decisions/curves.md, "How large is the error of a curve in motion?".
-constexpr double error_per_imbalance = 0.5;        // of the energy balance
-constexpr double least_error = 0.02;               // of what is asked for: no estimate is trusted below
-constexpr double start_steps = 40;                 // over which steps grow where the integrator begins
-constexpr double least_share = 0.2;                // of the difference of a pair, which is the error of the coarser run
-constexpr double alike = 0.7, share_if_alike = 3;  // runs of a pair by their steps, where these are not few: share()
-constexpr int few_steps = 8;
+constexpr double error_per_imbalance = 0.5;  // of the energy balance
+constexpr double least_error = 0.02;         // of what is asked for: no estimate is trusted below
 const char* const too_far =
     "fixed area and volume allow only some distances of the beads: free one of them, end the extension earlier, or try "
     "another accuracy.energy";
@@ -32,13 +28,6 @@ const char* const another_resolution =
 constexpr int most_stalled = 2000;  // steps, the last ones shorter than this part of the end
 constexpr double tiny_step = 1e-9;
 constexpr double hopeless_rise = 0.1;  // of E_ref: more is no error of a run that can be believed
-
-// Number of starts of the integrator until t: the first one, and one at each kink of the loads.
-int beginnings(const MotionLaw& law, double t) {
-    int count = 1;
-    for (double kink = next_kink(law, 0); kink < t; kink = next_kink(law, kink)) ++count;
-    return count;
-}
 
 }  // namespace
 
@@ -296,18 +285,6 @@ void CurveSimulation::summarise() {
     counters().describe(summary, setup_.settings.tolerance);
 }
 
-// The error is share(t) times the difference of the pair. Steps that only grow are alike in both runs and show nothing:
-// 40/steps, within 0.2 to 1. If the tolerance limited clearly fewer steps of the finer run, both share the errors of
-// the growing steps, which an instability may amplify: 3. With sources, which do not let errors be forgotten: 1.
-double CurveSimulation::share(double t) const {
-    const int own = trace.limited_steps(step_growth_of(setup_.settings), t),
-              other = coarser_->trace().limited_steps(step_growth_of(coarser(setup_.settings)), t);
-    if (other >= few_steps && own < alike * other) return share_if_alike;
-    if (setup_.c.law.source.act()) return 1;
-    const double growing = start_steps * beginnings(setup_.motion->law(), t);
-    return std::clamp(growing / std::max(trace.size(), 1), least_share, 1.0);
-}
-
 // The error is a share of the difference from the coarser run, or a part of the energy that is unaccounted for, as the
 // runs of a pair may have errors of their steps in common. That part is often too large: it alone never asks for a
 // finer run.
@@ -317,8 +294,7 @@ void CurveSimulation::compare(double t, const Snapshot& s) {
     const double asked = setup_.c.accuracy.energy * summary.reference_energy,
                  unbalanced = t > 0 ? error_per_imbalance * std::abs(imbalance(t, s)) : 0;
     const double least = given ? unbalanced : std::clamp(unbalanced, least_error * asked, asked);
-    const std::optional<double> difference = coarser_->trace().difference(t, s.free_energy);
-    error_now_ = std::max(difference ? share(t) * *difference : error_now_, least);
+    error_now_ = std::max(coarser_->error_of(trace, setup_.settings, t, s.free_energy).value_or(error_now_), least);
     error = std::max(error, error_now_);
 }
 

@@ -69,7 +69,6 @@ private:
     std::optional<StopReport> find_rise(const Snapshot& s);
     void look_at_mesh();
     void compare(double t, const Snapshot& s);
-    double share(double t) const;
     double imbalance(double t, const Snapshot& s) const {
         return s.total() - past_.total_start + dissipated(t) - work(t);
     }

@@ -123,6 +123,7 @@ ModeStability::ModeStability(const StationaryProblem& problem, const Equilibrium
             const auto base = profile_point(r[0], r[1], r[2], z[1], z[2]);
             for (int q = 0; q < lanes; ++q) {
                 Point p;
+                p.element = e, p.group = group, p.lane = q;
                 p.weight = b.weight[q], p.r = r[0][q], p.z = z[0][q], p.g = 1 / base.inverse_speed[q];
                 p.kappa_s = base.kappa_s[q], p.kappa_theta = base.kappa_theta[q], p.H = base.H[q];
                 p.slope = r[1][q] / p.g;
@@ -175,32 +176,30 @@ void ModeStability::add_gradients(int element, int group, const Vector& n_r, con
 void ModeStability::set_force(const std::vector<std::array<double, 4>>& first_variation) {
     const SplineSpace& splines = shape_.space->splines();
     const SplineSpace field(splines, Parity{});
-    const int n = field.size(), width = splines.width(), per_element = splines.groups() * lanes;
+    const int n = field.size(), width = splines.width();
     Matrix mass = Matrix::Zero(n, n);
     Vector load = Vector::Zero(n);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
-        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const int group = static_cast<int>(k) % per_element / lanes;
-        const auto& b = splines.basis(e, group);
+        const int e = p.element, q = p.lane;
+        const auto& b = splines.basis(e, p.group);
         const auto& d = first_variation[k];
         for (int a = 0; a < width; ++a) {
             const int i = field.dofs(e)[a];
             const double sign = field.signs(e)[a], f0 = sign * b.by_spline[q][0][a];
             load[i] -= p.weight * (d[0] * f0 + sign * (d[1] * b.by_spline[q][1][a] + d[2] * b.by_spline[q][2][a]));
-            if (gradients_) load[i] -= p.weight * d[3] * sign * third_->at(e, group).by_spline[q][a];
+            if (gradients_) load[i] -= p.weight * d[3] * sign * third_->at(e, p.group).by_spline[q][a];
             for (int c = 0; c < width; ++c)
                 mass(field.dofs(e)[c], i) +=
                     p.weight * p.r * p.g * p.along * f0 * field.signs(e)[c] * b.by_spline[q][0][c];
         }
     }
     const Vector force = solve_dense(mass, load);
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const auto& b = splines.basis(e, static_cast<int>(k) % per_element / lanes);
-        points_[k].force = 0;
+    for (Point& p : points_) {
+        const auto& b = splines.basis(p.element, p.group);
+        p.force = 0;
         for (int a = 0; a < width; ++a)
-            points_[k].force += field.signs(e)[a] * force[field.dofs(e)[a]] * b.by_spline[q][0][a];
+            p.force += field.signs(p.element)[a] * force[field.dofs(p.element)[a]] * b.by_spline[p.lane][0][a];
     }
 }
 
@@ -323,14 +322,13 @@ struct ModeStability::Forms {
 };
 
 ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) const {
-    const int width = field.width(), per_element = field.groups() * lanes;
+    const int width = field.width();
     const double m2 = m * m;
     Forms forms(field.size());
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
-        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const int group = static_cast<int>(k) % per_element / lanes;
-        const auto& b = field.basis(e, group);
+        const int e = p.element, q = p.lane;
+        const auto& b = field.basis(e, p.group);
         const auto Q = [&](int i, int j) { return p.Q[packed<6>(i, j)]; };
         const double dS = p.weight * p.r * p.g, n2 = p.along * p.along;
         Eigen::Matrix4d C = Eigen::Matrix4d::Zero();
@@ -342,7 +340,7 @@ ModeStability::Forms ModeStability::assemble(int m, const SplineSpace& field) co
         C(1, 2) = C(2, 1) = Q(W_s, W_ss);
         C(2, 2) = Q(W_ss, W_ss);
         if (gradients_) C += problem_.bending.kg * gradients_->second_variation(k, m);
-        const auto third = [&](int a) { return third_ ? third_->at(e, group).by_spline[q][a] : 0.0; };
+        const auto third = [&](int a) { return third_ ? third_->at(e, p.group).by_spline[q][a] : 0.0; };
         // Rigid motions as normal displacements over cos(m theta).
         const double motion[2] = {m == 0 ? p.normal_z : p.normal_r, p.z * p.normal_r - p.r * p.normal_z};
         for (int a = 0; a < width; ++a) {
@@ -435,13 +433,12 @@ Matrix ModeStability::dissipation_form(int m, const MotionLaw& law, Parity parit
                                                  : -parity.start,
                         mirror(parity) == 0 ? parity.end : -parity.end};
     const SplineSpace psi(field, turned);
-    const int n = field.size(), swirls = m == 0 ? 0 : psi.size(), width = field.width(),
-              per_element = field.groups() * lanes;
+    const int n = field.size(), swirls = m == 0 ? 0 : psi.size(), width = field.width();
     Matrix sigma = Matrix::Zero(3 * static_cast<Eigen::Index>(points_.size()), 2 * n + swirls);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& p = points_[k];
-        const int e = static_cast<int>(k) / per_element, q = static_cast<int>(k) % lanes;
-        const auto& b = field.basis(e, static_cast<int>(k) % per_element / lanes);
+        const int e = p.element, q = p.lane;
+        const auto& b = field.basis(e, p.group);
         const double root = std::sqrt(p.weight * p.r * p.g), sqrt2 = std::sqrt(2.0), rate = p.slope / p.r, mr = m / p.r;
         const auto add = [&](int column, double factor, double ss, double tt, double st) {
             const Eigen::Index row = 3 * static_cast<Eigen::Index>(k);

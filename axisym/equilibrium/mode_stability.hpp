@@ -46,7 +46,9 @@ public:
     std::vector<double> axisymmetric_rates(bool even, int count) const;
 
 private:
+    // Many fields: where a point is, and what the forms need of it.
     struct Point {
+        int element, group, lane;
         double weight, r, g, kappa_s, kappa_theta, H, slope, stretching;  // slope dr/ds of arc length, d log g / d s
         double normal_r, normal_z, z;
         double along;                // n . nu, of the displacement w n

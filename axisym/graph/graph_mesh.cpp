@@ -157,11 +157,18 @@ Density wanted_density(const SplineSpace& space, const std::vector<double>& mesh
 std::vector<double> adapted_breaks(const SplineSpace& space, const std::vector<double>& mesh_loss, double target,
                                    int fewest, int most) {
     const Density d = wanted_density(space, mesh_loss, target, fewest);
-    std::vector<double> count{0};
-    for (std::size_t i = 0; i < d.value.size(); ++i)
-        count.push_back(count.back() + d.value[i] * d.width(static_cast<int>(i)));
-    const int elements = std::max(fewest, static_cast<int>(std::min<double>(std::ceil(count.back()), most)));
-    return equal_shares(d.edges, count, elements);
+    const int elements = std::max(fewest, static_cast<int>(std::min<double>(std::ceil(d.integral()), most)));
+    const double share = d.integral() / elements;
+    std::vector<double> breaks{space.cell().z0};
+    double sum = 0;
+    for (std::size_t i = 0; i < d.value.size(); ++i) {
+        const double here = d.value[i] * d.width(static_cast<int>(i));
+        while (static_cast<int>(breaks.size()) < elements && sum + here >= share * breaks.size())
+            breaks.push_back(d.edges[i] + d.width(static_cast<int>(i)) * (share * breaks.size() - sum) / here);
+        sum += here;
+    }
+    breaks.push_back(space.cell().z1);
+    return breaks;
 }
 
 std::vector<double> refined_breaks(const SplineSpace& space, const std::vector<double>& mesh_loss, double target,

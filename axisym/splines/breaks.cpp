@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tubule::axisym {
 
@@ -25,9 +24,15 @@ std::vector<double> equal_shares(const std::vector<double>& places, const std::v
 }
 
 std::vector<double> regraded(const std::vector<double>& breaks, int elements) {
-    std::vector<double> count(breaks.size());
-    std::iota(count.begin(), count.end(), 0.0);
-    return equal_shares(breaks, count, elements);
+    const int n = static_cast<int>(breaks.size()) - 1;
+    std::vector<double> out(elements + 1);
+    for (int i = 0; i <= elements; ++i) {
+        const double at = static_cast<double>(i) * n / elements;
+        const int e = std::min(static_cast<int>(at), n - 1);
+        out[i] = breaks[e] + (at - e) * (breaks[e + 1] - breaks[e]);
+    }
+    out.back() = 1;
+    return out;
 }
 
 std::vector<double> graded_breaks(const std::vector<double>& seams, double largest, double smallest, double growth) {
