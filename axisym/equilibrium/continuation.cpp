@@ -40,6 +40,7 @@ public:
     std::string meets_itself(const Eigen::VectorXd& u) const { return where(system_->space(), curve(u)); }
     std::string meets_itself(const Equilibrium& e) const { return where(*e.space, e.x); }
 
+    double energy(const Equilibrium& e) const { return e.observed.energy; }
     int index_of(const BranchPoint& p, const StationaryProblem& problem, int before) const {
         return p.kind == PointKind::regular ? p.shape.negative_directions
                                             : before + directions_without_mirror(problem, p.shape);

@@ -231,9 +231,9 @@ public:
     static std::string advice(Stop stop) {
         switch (stop) {
             case Stop::solver_failed:
-                return "start from a shape closer to the solution, or raise accuracy.energy";
+                return "begin with a shape closer to the solution, or use a looser accuracy.energy";
             case Stop::resolution_lost:
-                return "raise accuracy.energy; a neck that closes cannot be followed to its end";
+                return "use a looser accuracy.energy; a neck that closes cannot be followed to its end";
             case Stop::self_intersection:
                 return "the equations can still be solved, but their solution is no longer an embedded surface";
             default:

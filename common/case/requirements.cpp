@@ -218,7 +218,7 @@ const std::vector<Requirement> rows{
     value("discretisation.scheme", scheme_without(&SchemeEntry::general),
           {inextensible, resisted, as_begun, number_H0, few_terms, no_alpha, no_potential}),
     key("energy.potential", {time, no_family, resisted, fixed_period},
-        "it holds the membrane at a place, which nothing else here knows"),
+        "it holds the membrane at a place, and a motion then needs inertia or model.gamma > 0"),
     {"energy.potential",
      [](P p) { return p.tier != Tier::axisym || std::ranges::any_of(p.energy.potentials, &Potential::is_wall); },
      {closed},

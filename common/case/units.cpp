@@ -194,9 +194,11 @@ LabUnit lab_unit(const std::optional<Scales>& scales, std::string_view unit) {
     static const std::array<std::pair<Powers, const char*>, 4> named{
         {{{1, -1, 0}, "N"}, {{1, -2, 0}, "N/m"}, {{1, -3, 0}, "Pa"}, {{0, 1, -1}, "m/s"}}};
     for (const auto& [of, name] : named)
-        if (of == *powers)
-            return prefixed(std::pow(scales->energy, energy) * std::pow(scales->length, length) * std::pow(T, time),
-                            name);
+        if (of == *powers) {
+            const double si = std::pow(scales->energy, energy) * std::pow(scales->length, length) * std::pow(T, time);
+            const bool of_tweezers = of == named[0].first && si > 1e-15 && si < 1e-9;
+            return of_tweezers ? LabUnit{si * 1e12, "pN"} : prefixed(si, name);
+        }
     return product({{{scales->energy / scales->kT, "kT"}, prefixed(scales->length, "m", 0), prefixed(T, "s", 0)}},
                    *powers);
 }

@@ -93,6 +93,7 @@ enum class Renewal { none, same_size, new_mesh, impossible };
 //   renew(place)              other unknowns for the same shape and tangent, a better mesh where this one is too coarse
 //   why_not_renewed(parameter)             words for the latter
 //   meets_itself(u), meets_itself(shape)   where, to follow "the shape intersects itself"; empty: nowhere
+//   energy(shape)
 //   report(place, problem, kind)           the shape; regular ones are found again with the parameter held
 //   index_of(point, problem, before)       of a point to report, given the number that the continuation counts
 template <class Tier>
@@ -193,6 +194,7 @@ private:
 
     void record(Point p, int index) {
         p.index = index;
+        repeated_ = is_known(p) ? repeated_ + 1 : 0;
         branch_.points.push_back(std::move(p));
         settings_.found(branch_.points.back());
     }
@@ -201,10 +203,35 @@ private:
     std::optional<std::pair<Stop, std::string>> check() {
         const double p = place_.parameter();
         if (!branch_.message.empty()) return {{Stop::self_intersection, branch_.message}};
-        if (p < low_ || p > high_) return {{Stop::finished, ""}};
+        if (p < low_ || p > high_) return {{Stop::finished, ended_at(p < low_ ? low_ : high_)}};
+        if (repeated_ > 1) return {{Stop::finished, ended_at(p)}};
         if (met_itself(tier_.meets_itself(place_.u()), p)) return {{Stop::self_intersection, branch_.message}};
         if (!renew()) return {{Stop::resolution_lost, tier_.why_not_renewed(p)}};
         return std::nullopt;
+    }
+
+    // In words, and a warning where the branch that was asked for does not reach its end.
+    std::string ended_at(double parameter) {
+        if (std::abs(parameter - settings_.to) < 1e-6 * range_)
+            return fmt::format("the branch reached the parameter {:.6g}", settings_.to);
+        const auto fold = std::ranges::find(branch_.points.rbegin(), branch_.points.rend(), PointKind::fold,
+                                            &BranchPoint<Shape>::kind);
+        const std::string turned =
+            fold == branch_.points.rend() ? "" : fmt::format("turned at the fold at {:.6g} and ", fold->parameter);
+        const std::string ended = repeated_ > 1 ? fmt::format("repeats its shapes at the parameter {:.6g}", parameter)
+                                                : fmt::format("ended at the parameter {:.6g}", settings_.from);
+        const std::string out = fmt::format("the branch {}{}: it did not reach {:.6g}", turned, ended, settings_.to);
+        if (settings_.mode == 0) branch_.warnings.push_back(out);
+        return out;
+    }
+
+    // A branch that is closed, or that Newton's method has turned around on a coarse mesh, comes to its shapes again.
+    bool is_known(const Point& p) const {
+        return p.kind != PointKind::fold && std::ranges::any_of(branch_.points, [&](const Point& before) {
+                   const double energy = tier_.energy(before.shape);
+                   return std::abs(p.parameter - before.parameter) < 1e-6 * range_ &&
+                          std::abs(tier_.energy(p.shape) - energy) < 1e-6 * std::abs(energy);
+               });
     }
 
     // Mean square of the shape's displacement relative to its size, and of the parameter's relative to its range.
@@ -464,7 +491,8 @@ private:
     double range_, low_ = 0, high_ = 0;
     decltype(std::declval<Tier&>().factors()) lu_;
     Place place_;
-    int index_ = 0;  // at the place
+    int index_ = 0;     // at the place
+    int repeated_ = 0;  // how many of the last points have been there before
     Branch<Shape> branch_;
 };
 

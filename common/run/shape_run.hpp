@@ -134,9 +134,7 @@ RunSummary run_shapes(const Problem& c, Tier& tier, const RunClock& clock, RunOb
         Branch<Shape> branch = follow_branches(task.problem, first.shape, task.set, settings,
                                                [](const auto&... of) { return follow_branch(of...); });
         s.warnings = std::move(branch.warnings);
-        return {branch.stop, 0,
-                branch.stop == Stop::finished ? "the branch left its parameter interval" : branch.message,
-                tier.advice(branch.stop)};
+        return {branch.stop, 0, branch.message, tier.advice(branch.stop)};
     };
     try {
         s.stop = find();

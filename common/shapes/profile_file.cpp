@@ -469,8 +469,8 @@ FittedProfile read_profile(const std::filesystem::path& path, const std::string&
     }
     if (!(best.distance <= tolerance))
         refuse(path, fmt::format("no smooth curve comes within {:.3g} of all {} points: the best is {:.3g} off; set "
-                                 "shape.tolerance to that, or give more points where the profile bends",
-                                 tolerance, points.size(), best.distance));
+                                 "shape.tolerance to {:.2g}, or give more points where the profile bends",
+                                 tolerance, points.size(), best.distance, 1.1 * best.distance));
     const int waves = best.curve.waves;
     for (int i = 1; i < points_per_wave * waves; ++i) {
         const auto at = best.curve(double(i) / (points_per_wave * waves));

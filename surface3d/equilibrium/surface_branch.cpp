@@ -60,6 +60,7 @@ public:
     std::string meets_itself(const Eigen::VectorXd& u) const { return where(system_.mesh(u)); }
     std::string meets_itself(const SurfaceEquilibrium& e) const { return where(e.mesh); }
 
+    double energy(const SurfaceEquilibrium& e) const { return e.values.energy; }
     int index_of(const BranchPoint& p, const StationaryProblem&, int before) const {
         return p.kind == PointKind::regular ? p.shape.spectrum.negative : before;
     }

@@ -183,7 +183,7 @@ public:
             case Stop::solver_failed:
                 return "begin with a shape closer to the solution, such as a result of tier \"axisym\"";
             case Stop::resolution_lost:
-                return "raise accuracy.energy";
+                return "use a looser accuracy.energy";
             case Stop::mesh_lost:
                 return "use more elements, or discretisation.mesh = \"graded\"";
             case Stop::self_intersection:

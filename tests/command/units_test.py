@@ -93,7 +93,7 @@ class Units(ProgramTest):
         found, time = series(self.result), 2e4 * 50e-9**4 / (20 * 1.380649e-23 * 298.15) * 1e6
         self.assertEqual(found["time"][-1], 0.2)
         self.assertIn(f"at t = {0.2 * time:.6g} us", out)
-        self.assertIn(f"energy {found['energy'][-1] * 20:.9g} kT, error at most", out)
+        self.assertIn(f"energy {found['energy'][-1] * 20:.9g} kT, estimated error", out)
         words, row = self.last_row()
         self.assertRegex(words, r"(?m)^units +1 of length is 50 nm, of energy 20 kT; of time 1\.518 us$")
         self.assertEqual(row["energy"], f"{found['energy'][-1] * 20:.12g} kT")

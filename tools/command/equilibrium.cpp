@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -49,7 +50,7 @@ Text table_of(const Result& result, const std::optional<Scales>& scales) {
         if (branch) add(out, "{:>14.9g}  ", value("parameter", i));
         add(out, "{:>16.11g} {:>14.9g} {:>14.9g} {:>9.5f} {:>10.6f} {:>4}", value("energy", i), value("tension", i),
             value("pressure", i), value("height", i), value("r_max", i), known ? fmt::to_string(negative) : "?");
-        if (beads) add(out, " {:>12.6f}", value("force", i) + 0.0);
+        if (beads) add(out, " {:>12.6f}", std::round(1e6 * value("force", i)) / 1e6 + 0.0);
         if (modes && known) {
             int fastest = 0;
             for (int m = 0; has(fmt::format("growth_{}", m).c_str()); ++m)

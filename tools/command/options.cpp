@@ -43,13 +43,15 @@ std::filesystem::path installed(const std::filesystem::path& path, const std::fi
     return std::filesystem::exists(found, ignored) ? found : std::filesystem::path(TUBULE_SOURCE_DIR) / source;
 }
 
+std::string with_installed_case(const std::string& file) {
+    std::error_code ignored;
+    if (!file.starts_with("cases/") || std::filesystem::exists(file, ignored)) return file;
+    const auto found = installed("share/tubule/" + file, file);
+    return std::filesystem::exists(found, ignored) ? found.string() : file;
+}
+
 void finds_installed_cases(CLI::Option& option) {
-    option.transform([](const std::string& file) {
-        std::error_code ignored;
-        if (!file.starts_with("cases/") || std::filesystem::exists(file, ignored)) return file;
-        const auto found = installed("share/tubule/" + file, file);
-        return std::filesystem::exists(found, ignored) ? found.string() : file;
-    });
+    option.transform(with_installed_case);
 }
 
 }  // namespace tubule

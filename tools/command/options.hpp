@@ -29,5 +29,6 @@ std::filesystem::path installed(const std::filesystem::path& path, const std::fi
 // Lets an option that names case files find those that are installed: cases/NAME.toml, unless there is such a file
 // here.
 void finds_installed_cases(CLI::Option& option);
+std::string with_installed_case(const std::string& file);
 
 }  // namespace tubule

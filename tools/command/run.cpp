@@ -171,8 +171,8 @@ void report(const ChosenCase& chosen, const RunSummary& s, const std::string& fi
         say(stdout, "    {}{}\n", s.stop.advice.empty() ? "what to do" : s.stop.advice, about);
     for (const std::string& warning : s.warnings) say(stdout, "    warning: {}\n", warning);
     if (s.reference_energy > 0 && s.error_is_known())
-        say(stdout, "    energy {}, error at most {:.2g} of E_ref = {} (estimated; {:.2g} asked)\n",
-            with_unit(s.energy, J, 9), s.estimated_error, with_unit(s.reference_energy, J, 4), c.accuracy.energy);
+        say(stdout, "    energy {}, estimated error {:.2g} of E_ref = {} (asked: {:.2g})\n", with_unit(s.energy, J, 9),
+            s.estimated_error, with_unit(s.reference_energy, J, 4), c.accuracy.energy);
     else if (s.reference_energy > 0)
         say(stdout, "    energy {}, error unknown; E_ref = {}\n", with_unit(s.energy, J, 9),
             with_unit(s.reference_energy, J, 4));

@@ -371,7 +371,11 @@ void add_thresholds(Text& out, const UniformTube& tube, const std::vector<Thresh
     }
     for (int m = 0; m <= last; ++m)
         if (!theory::stable_tensions(tube, m)) add(out, "  {:<16} {:>3} at every tension\n", instability(m), m);
-    if (const auto stable = theory::common_stable_tensions(tube, last))
+    const auto stable = theory::common_stable_tensions(tube, last);
+    if (stable && stable->lowest == stable->highest)
+        add(out, "  at every tension but {} some wave with m <= {} grows\n", with_unit(stable->lowest, in.tension, 8),
+            last);
+    else if (stable)
         add(out, "  no wave with m <= {} grows for tensions from {} to {}\n", last,
             with_unit(stable->lowest, in.tension, 8), with_unit(stable->highest, in.tension, 8));
     else

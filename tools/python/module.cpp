@@ -16,6 +16,7 @@
 #include "common/case/text.hpp"
 #include "common/energy/bending.hpp"
 #include "common/geometry/profile_point.hpp"
+#include "common/result/about.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/result/hdf5_file.hpp"
 #include "common/result/record.hpp"
@@ -28,9 +29,11 @@
 #include "common/theory/waves.hpp"
 #include "tools/command/build_info.hpp"
 #include "tools/command/commands.hpp"
+#include "tools/command/options.hpp"
 #include "tools/command/stability.hpp"
 #include "tools/command/units.hpp"
 #include "tools/python/memory_result.hpp"
+#include "tools/run/case_checks.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/run/forecast.hpp"
 #include "tools/scan/dispatcher.hpp"
@@ -231,12 +234,14 @@ Results run(const Problem& c, const py::object& progress, const py::object& outp
             }
         };
     options.interrupted = [&] { return unwanted || (enough && enough->raised); };
-    std::vector<std::string> notes;
+    std::vector<std::string> notes = physics_notes(c);
     options.note = [&](const std::string& words) { notes.push_back(words); };
     if (!output.is_none()) options.output = output.cast<std::filesystem::path>();
     options.overwrite = overwrite;
     Result done = without_gil(threads, [&] { return run_in_memory(c, options); });
     if (raised) std::rethrow_exception(raised);
+    if (const auto* warnings = find_value<std::string>(done.about, "warnings"))
+        for (const std::string& words : split(*warnings, '\n')) notes.push_back(words);
     for (const std::string& words : notes)
         py::module_::import("warnings").attr("warn")(words, py::handle(PyExc_UserWarning), 2);
     return {std::make_shared<const Result>(std::move(done))};
@@ -338,7 +343,7 @@ void add_cases(py::module_& m) {
     m.def(
         "read_case",
         [](const std::filesystem::path& path, const std::vector<std::string>& sets) {
-            return Problem(read_case(path, sets));
+            return Problem(read_case(with_installed_case(path.string()), sets));
         },
         py::arg("path"), py::arg("sets"));
 }

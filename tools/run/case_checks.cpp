@@ -142,7 +142,13 @@ std::string frozen_wave(const Problem& c) {
 std::string sign_of_H0(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     const auto* sphere = std::get_if<Sphere>(&c.shape);
-    if ((!tube && !sphere) || c.is_equilibrium() || c.energy.H0_varies() || !(c.energy.H0 > 0)) return {};
+    if (c.energy.H0_varies() || !(c.energy.H0 > 0)) return {};
+    if (std::holds_alternative<Ellipsoid>(c.shape) || ((tube || sphere) && c.is_equilibrium()))
+        return note(c, "energy.H0",
+                    fmt::format("= {0:g} is positive, but H is negative where a surface is convex: Helfrich's "
+                                "spontaneous curvature c0 = {0:g} is H0 = -{0:g}",
+                                c.energy.H0));
+    if (!tube && !sphere) return {};
     const double H = tube ? -1 / tube->radius : -2 / sphere->radius;
     return note(c, "energy.H0",
                 fmt::format("= {:g} is positive, but H is negative on a {}: {} = {:.4g} here. H0 = {:.4g} would be "

@@ -32,9 +32,8 @@ def run(case, *, output: str | os.PathLike | None = None, overwrite: bool = Fals
     progress  called with (time, energy, step) at most ten times a second; what it raises ends the run
     threads   for loops over elements of tier surface3d, at most one a processor; 0: one a processor
 
-    A run that cannot go on is no exception: see Result.stop. What is worth knowing, such as an accuracy that is wider than
-    what the energy can change by, is a warning of Python. Ctrl-C raises KeyboardInterrupt. Raises CaseError for bad
-    input, ValueError or TypeError for other arguments that make no sense, RuntimeError where nothing could be computed.
+    A run that cannot go on is no exception: see Result.stop. Each note on the case and each of Result.warnings is a
+    warning of Python (UserWarning), too. Ctrl-C raises KeyboardInterrupt. Raises CaseError for bad input, ValueError or TypeError for other arguments that make no sense, RuntimeError where nothing could be computed.
 
     >>> result = run(tube)
     >>> result.stop, len(result.frames)

@@ -188,7 +188,7 @@ class Result:
 
     @property
     def energy(self) -> float:
-        """At the end."""
+        """At the end; of a branch, of its last shape. Dimensionless: in_units("energy") has that of the case."""
         return float(self.series["energy"][-1])
 
     @property
@@ -199,10 +199,12 @@ class Result:
 
     @property
     def warnings(self) -> list[str]:
+        """What the run warned of, such as an error that is unknown: look at them after each run."""
         return [line for line in self.about.get("warnings", "").splitlines() if line]
 
     @property
     def case(self) -> Case:
+        """The case that was run, with its overrides."""
         return Case._of(self._core.case(self._name))
 
     @property
@@ -211,10 +213,17 @@ class Result:
         units = self.case.units
         return {of: unit for of, unit in units.items() if of != "time" or not self.case._core.is_equilibrium}
 
-    def in_units(self, name: str) -> tuple[np.ndarray, str]:
-        """A series in the units of the case, and the name of its unit: ([251.3, ...], "kT"); "" where it has none."""
-        unit = self.units.get(self._core.dimensions(name), {"scale": 1.0, "unit": ""})
-        return self.series[name] * unit["scale"], unit["unit"]
+    def in_units(self, name: str, unit: str | None = None) -> tuple[np.ndarray, str]:
+        """A series in the units of the case, and the name of its unit: ([251.3, ...], "kT"); "" where it has none.
+        `unit`: the same with another prefix, such as "mN/m" for "nN/m"."""
+        of_case = self.units.get(self._core.dimensions(name), {"scale": 1.0, "unit": ""})
+        values, own = self.series[name] * of_case["scale"], of_case["unit"]
+        if unit is None or unit == own:
+            return values, own
+        powers = {prefix + own[skip:]: 3 * n - 18 for skip in (0, 1) for n, prefix in enumerate(["a", "f", "p", "n", "u", "m", "", "k", "M", "G"])}
+        if not {own, unit} <= set(powers) or "^" in own:
+            raise ValueError(f"{name} is in {own or 'no unit'}, which is not {unit} with another prefix")
+        return values * 10.0 ** (powers[own] - powers[unit]), unit
 
     def _shown(self, units: str = ""):
         """As the drawing code reads it, in other units than those of its case where they are given."""
@@ -238,7 +247,8 @@ class Result:
 
     def __repr__(self) -> str:
         rows = len(self.series["time"])
-        return f"<tubule.Result {self.stop}, {rows} rows, {len(self.frames)} frames>"
+        warned = {0: "", 1: ", 1 warning"}.get(len(self.warnings), f", {len(self.warnings)} warnings")
+        return f"<tubule.Result {self.stop}, {rows} rows, {len(self.frames)} frames{warned}>"
 
     def _repr_html_(self) -> str:
         """In a notebook: the page of `tubule view`, or why there is none."""

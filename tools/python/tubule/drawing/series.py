@@ -14,6 +14,7 @@ from .style import DASHES, Legend, axes_at, line_colours, result_handles
 HEIGHT, BALANCE_HEIGHT = 2.6, 1.7  # inches of the axes
 DECADES = 9  # the most of a balance that are shown below the largest value
 BALANCE = ("dissipation", "kinetic_energy", "identity_defect", "energy_error")
+LONGEST_WORDS = 36  # of a label: longer ones leave the axis, and the name stands there instead
 
 
 def meanings(results):
@@ -74,7 +75,8 @@ class SeriesPanel:
         self.height = HEIGHT + 0.62 + self.legend.below
 
     def _name(self, name):
-        return in_unit("time t" if name == "time" else self.meanings.get(name, name), self.units.get(name, ""))
+        words = self.meanings.get(name, name)
+        return in_unit("time t" if name == "time" else words if len(words) <= LONGEST_WORDS else name.replace("_", " "), self.units.get(name, ""))
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
