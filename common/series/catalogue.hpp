@@ -41,7 +41,7 @@ inline constexpr SeriesEntry series_catalogue[] = {
     {"work", "energy", "work of changes of tension, pressure and force, and of sources; kinetic energy from a reservoir",
      SeriesUse::energy},
     {"dissipation", "energy/time", "dissipation, at which F and the kinetic energy fall"},
-    {"identity_defect", "energy", "defect of the energy identity", SeriesUse::diagnostic},
+    {"identity_defect", "energy", "energy-balance residual", SeriesUse::diagnostic},
     {"area", "length^2", "area"},
     {"volume", "length^3", "enclosed volume"},
     {"volume_drift", "1", "relative change of a volume that is to be kept", SeriesUse::diagnostic},
