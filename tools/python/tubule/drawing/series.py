@@ -1,5 +1,5 @@
-"""Panels of series: any against time or another series (`tubule plot --series`), and dissipation, kinetic energy, the defect
-of the energy identity and the estimated error against the logarithm of time."""
+"""Panels of series: any against time or another series (`tubule plot --series`), and dissipation, kinetic energy, the
+energy-balance residual and the estimated error against the logarithm of time."""
 
 import difflib
 from dataclasses import dataclass
