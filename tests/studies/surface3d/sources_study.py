@@ -121,6 +121,15 @@ def exact(shape, vortex, kind, axisymmetric, time):
                 tension=-(number(p) * dS).sum() / area)
 
 
+def field_errors(frame, shape, vortex, kind):
+    """Of u and p: root mean squares over the nodes, relative to those of the exact fields."""
+    _, _, u, p, *_ = flow(shape, vortex, kind == "fluid", kind in ("fluid", "stokes"), False)
+    at, time = frame["Points"][:].T, float(frame.attrs["time"])
+    number = lambda f: np.broadcast_to(sympy.lambdify(X, f.subs(T, time), "numpy")(*at), at[0].shape)
+    exact_fields = {"u": np.array([number(v) for v in u]), "p": number(p)}
+    return {n: np.sqrt(np.mean((frame[f"PointData/{n}"][:].T - e) ** 2) / np.mean(e**2)) for n, e in exact_fields.items()}
+
+
 def errors(program, tier, shape, vortex, kind, end, discretisation, asked):
     initial = [float(a.subs(T, 0)) for a in AXES[shape]]
     shape_keys = 'kind = "ellipsoid"\n' + "\n".join(f"{n} = {a}" for n, a in zip("abc", initial))
@@ -143,6 +152,8 @@ def errors(program, tier, shape, vortex, kind, end, discretisation, asked):
             out = {q: abs(float(series[q][-1]) - values[q]) / max(abs(values[q]), 1e-30) for q in QUANTITIES
                    if q in series and values[q] != 0}
             out["stated"] = abs(float(series["energy"][-1]) - values["energy"]) / stated if stated > 0 else np.nan
+            if tier == "surface3d":
+                out |= field_errors(file["frames"][sorted(file["frames"])[-1]], shape, vortex, kind)
             out["of_scale"] = abs(float(series["energy"][-1]) - values["energy"]) / scale
     return out
 
@@ -185,7 +196,8 @@ def main():
                 widths = [n**-0.5 for n in counts]
                 keys = {"order": k, "scheme": '"bdf"', "step": 0.005}
                 rows = [errors(program, "surface3d", shape, vortex, "stokes", 0.2, keys | {"elements": n}, 0.1) for n in counts]
-                orders = table(f"{shape}, k = {k}, widths; claimed {claim}: {' '.join(QUANTITIES)}", rows, QUANTITIES, widths)
+                names = (*QUANTITIES, "u", "p")
+                orders = table(f"{shape}, k = {k}, widths; claimed {claim}: {' '.join(names)}", rows, names, widths)
                 if orders["energy"] < claim - 0.2:
                     bad.append(f"{shape} k = {k} {orders}")
     for what in bad:
