@@ -137,8 +137,7 @@ const std::vector<Requirement> rows{
     value("equilibrium.branch.vary", varied(vary_height), {two_rings}, "it is the distance of the rings"),
     value("equilibrium.branch.vary", varied(vary_kg), {axisym, whole}, "the gradient term is computed there alone"),
     key("equilibrium.rates", {surface}, "the rates of each m are those of equilibrium.modes"),
-    key("equilibrium.rates", {no_inertia}, "growth rates neglect inertia"),
-    key("equilibrium.modes", {axisym, no_inertia}, "growth rates neglect inertia"),
+    key("equilibrium.modes", {axisym, no_inertia}, "rates of tier axisym neglect inertia"),
     value(
         "shape.kind", [](P p) { return std::holds_alternative<Torus>(p.shape) && p.tier == Tier::axisym; }, {motion},
         "equilibria of this tier are closed cells, or tubes with mirror symmetry"),

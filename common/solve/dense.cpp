@@ -22,11 +22,17 @@ std::optional<Eigenpairs> eigenpairs(const Matrix& A, const Matrix& B) {
     return Eigenpairs{solver.eigenvalues(), solver.eigenvectors()};
 }
 
+std::optional<ComplexEigenpairs> general_eigenpairs(const Matrix& A) {
+    const Eigen::EigenSolver<Matrix> solver(A);
+    if (solver.info() != Eigen::Success) return {};
+    return ComplexEigenpairs{solver.eigenvalues(), solver.eigenvectors()};
+}
+
 bool is_positive_definite(const Matrix& A) {
     return Eigen::LLT<Matrix>(A).info() == Eigen::Success;
 }
 
-Eigen::VectorXd solve_dense(const Matrix& A, const Eigen::VectorXd& b) {
+Matrix solve_dense(const Matrix& A, const Matrix& b) {
     return Eigen::PartialPivLU<Matrix>(A).solve(b);
 }
 

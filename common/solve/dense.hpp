@@ -19,10 +19,17 @@ Eigenpairs eigenpairs(const Eigen::MatrixXd& A, bool vectors);
 // A v = mu B v for symmetric A and B. Nothing if B is not positive definite or the iteration does not converge.
 std::optional<Eigenpairs> eigenpairs(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
+struct ComplexEigenpairs {
+    Eigen::VectorXcd values;
+    Eigen::MatrixXcd vectors;
+};
+// A v = mu v for any A. Nothing if the iteration does not converge.
+std::optional<ComplexEigenpairs> general_eigenpairs(const Eigen::MatrixXd& A);
+
 bool is_positive_definite(const Eigen::MatrixXd& A);
 
-// x with A x = b, by LU factors.
-Eigen::VectorXd solve_dense(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+// x with A x = b, one column or more, by LU factors.
+Eigen::MatrixXd solve_dense(const Eigen::MatrixXd& A, const Eigen::MatrixXd& b);
 
 // X of least norm among those that minimise |A X - B|. Pivots below the threshold, relative to the largest, count as
 // zero; without a threshold those of rounding.

@@ -113,7 +113,7 @@ private:
     void remember(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         before_ = {energy_of(system, u), out_.mesh.triangles(), {}};
         if (settings_.modes > 0) try {
-                before_->eigenvalues = system.modes(u, settings_.law, settings_.modes).values;
+                before_->spectrum = system.modes(u, settings_.law, settings_.modes);
             } catch (const SolveError&) {  // the errors remain unknown
             }
     }
@@ -121,8 +121,9 @@ private:
     SurfaceEquilibrium finish(const SurfaceSystem& system, const Eigen::VectorXd& u) {
         try {
             out_.spectrum = system.modes(u, settings_.law, settings_.modes);
-            if (before_ && before_->eigenvalues.size() == out_.spectrum.values.size())
-                out_.spectrum.errors = error_since(before_->eigenvalues, out_.spectrum.values);
+            if (before_)
+                set_errors(before_->spectrum, before_->triangles, out_.spectrum, out_.mesh.triangles(),
+                           out_.mesh.order);
             if (settings_.modes > 0)
                 out_.wave_numbers = system.wave_numbers(u, out_.spectrum.vectors.topRows(out_.mesh.size()));
         } catch (const SolveError& error) {
@@ -168,7 +169,7 @@ private:
     struct Before {
         double energy;
         int triangles;
-        Eigen::VectorXd eigenvalues;
+        SurfaceSpectrum spectrum;
     };
     std::optional<Before> before_;  // on the mesh before
 };

@@ -30,6 +30,21 @@ Sparse turned_at_nodes(const VectorField& normal, int unknowns) {
     return out;
 }
 
+// For velocities along x, y, z, zeros for the other unknowns: a stretch has neither mass nor friction, theory.md
+// (3.19).
+Sparse mass_of_velocities(const SurfaceSpace& space, const CurvedMesh& mesh, int unknowns) {
+    const Sparse mass = mass_matrix(space, mesh);
+    const int n = mesh.size();
+    Triplets entries;
+    for (int d = 0; d < 3; ++d)
+        for (int j = 0; j < n; ++j)
+            for (Sparse::InnerIterator it(mass, j); it; ++it)
+                entries.emplace_back(d * n + it.row(), d * n + j, it.value());
+    Sparse out(unknowns, unknowns);
+    out.setFromTriplets(entries.begin(), entries.end());
+    return out;
+}
+
 // A basis of what the columns span, but for parts smaller than `least`.
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns, double least) {
     if (columns.cols() == 0) return columns;
@@ -192,11 +207,11 @@ FlowForm flow_form(const ConstrainedForm& second_variation, const SurfaceSpace& 
     const Eigen::Index still = viscous ? rigid.cols() : 0;  // without friction nothing else stops these
     out.form.constraints = Eigen::MatrixXd::Zero(all, out.held + still + 1);
     out.form.constraints.leftCols(out.held) = placed(A.constraints, n, all);
-    if (still > 0) {
-        Eigen::MatrixXd products(3 * n, still);
-        const Sparse mass = mass_matrix(space, mesh);
-        for (int d = 0; d < 3; ++d) products.middleRows(d * n, n) = mass * rigid.middleRows(d * n, n);
-        out.form.constraints.middleCols(out.held, still).topRows(3 * n) = turn.transpose() * products;
+    if (viscous) {
+        const Sparse mass = mass_of_velocities(space, mesh, all);
+        const Sparse turned = turned_at_nodes(normal, all);
+        if (law.inertia != 0) out.inertia = law.inertia * (turned.transpose() * mass * turned);
+        out.form.constraints.middleCols(out.held, still) = turned.transpose() * (mass.leftCols(3 * n) * rigid);
     }
     // A mean of p would repeat the constraint of the area, if there is one.
     out.form.constraints.rightCols(1).topRows(fields) = drag.mean;

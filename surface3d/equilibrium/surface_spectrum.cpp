@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <optional>
 #include <tuple>
@@ -203,7 +204,182 @@ std::pair<Eigen::VectorXd, Pairs> largest_of(const InvertedFlow& inverse, const 
     }
 }
 
+// (B - shift)^-1 for the flow of a fluid in (w, u), w' = u.nu and inertia u' = -A w - mass u as B has it: theory.md
+// (8.14). Columns are shift w over u, zeros for pressures.
+class InvertedFluid {
+public:
+    InvertedFluid(const FlowForm& flow, const Shifted& factors, double shift)
+        : flow_(flow), factors_(factors), shift_(shift), all_(flow.form.form.rows()) {}
+
+    // Velocities that forces along the normal lead to, and w as if they had lasted since 1/shift.
+    Eigen::MatrixXd pushed(int count) const {
+        Eigen::MatrixXd out(flow_.size + all_, count);
+        for (int j = 0; j < count; ++j) {
+            const double turns = 1 + j * static_cast<double>(flow_.nodes);
+            Eigen::VectorXd f = Eigen::VectorXd::Zero(all_);
+            f.head(flow_.nodes) = Eigen::VectorXd::LinSpaced(flow_.nodes, 1, 1 + turns).array().sin();
+            f = flow_.inertia * velocities(f);
+            out.col(j).tail(all_) = velocities(f);
+            out.col(j).head(flow_.size) = without_motions(normal_part(out.col(j).tail(all_)));
+        }
+        return out;
+    }
+    Eigen::MatrixXd operator()(const Eigen::MatrixXd& z) const {
+        Eigen::MatrixXd out(z.rows(), z.cols());
+        for (Eigen::Index j = 0; j < z.cols(); ++j) {
+            const Eigen::VectorXd w = z.col(j).head(flow_.size) / shift_, u = z.col(j).tail(all_);
+            out.col(j).tail(all_) = velocities(of_form(w) - shift_ * (flow_.inertia * u));
+            out.col(j).head(flow_.size) = without_motions(normal_part(out.col(j).tail(all_)) - w);
+        }
+        return out;
+    }
+    // Whether elastic energy, which equals the kinetic one of what oscillates, drives z; else a velocity dies out.
+    bool is_shape(const Eigen::VectorXcd& z) const {
+        double elastic = 0, kinetic = 0;
+        for (const Eigen::VectorXd& part : {Eigen::VectorXd(z.real()), Eigen::VectorXd(z.imag())}) {
+            const Eigen::VectorXd w = part.head(flow_.size) / shift_, u = part.tail(all_);
+            elastic += placed(w).dot(of_form(w)), kinetic += u.dot(flow_.inertia * u);
+        }
+        return std::abs(elastic) > (1 - 1e-2) * kinetic;
+    }
+    // Rates on what the columns z span, which are left eigenvectors, too, once w is multiplied by A and u by -inertia:
+    // of the second order in the errors of z. Vectors are coefficients of the columns.
+    ComplexEigenpairs rates_on(const Eigen::MatrixXd& z) const {
+        const Eigen::Index n = z.cols();
+        Eigen::MatrixXd w(all_, n), Aw(all_, n);
+        for (Eigen::Index j = 0; j < n; ++j) {
+            const Eigen::VectorXd one = z.col(j).head(flow_.size) / shift_;
+            w.col(j) = placed(one), Aw.col(j) = of_form(one);
+        }
+        const Eigen::MatrixXd u = z.bottomRows(all_), cross = Aw.transpose() * u;
+        const Eigen::MatrixXd products = w.transpose() * Aw - u.transpose() * (flow_.inertia * u),
+                              rates = cross + cross.transpose() + u.transpose() * (flow_.form.mass * u);
+        auto found = general_eigenpairs(solve_dense(products, rates));
+        if (!found) throw SolveError("the rates on a space of velocities were not found");
+        return std::move(*found);
+    }
+
+private:
+    Eigen::VectorXd velocities(const Eigen::VectorXd& f) const {
+        Eigen::VectorXd x = factors_.solve(f);
+        const Eigen::Index pressures = flow_.multipliers + 1, stretch = flow_.size - flow_.nodes;
+        x.segment(all_ - stretch - pressures, pressures).setZero();
+        return x;
+    }
+    Eigen::VectorXd placed(const Eigen::VectorXd& w) const {
+        Eigen::VectorXd x = Eigen::VectorXd::Zero(all_);
+        const Eigen::Index stretch = flow_.size - flow_.nodes;
+        x.head(flow_.nodes) = w.head(flow_.nodes), x.tail(stretch) = w.tail(stretch);
+        return x;
+    }
+    Eigen::VectorXd of_form(const Eigen::VectorXd& w) const {
+        const Eigen::VectorXd x = placed(w);
+        const ConstrainedForm& A = flow_.form;
+        return A.form * x + A.low_rank * A.weights.cwiseProduct(A.low_rank.transpose() * x);
+    }
+    Eigen::VectorXd normal_part(const Eigen::VectorXd& u) const {
+        Eigen::VectorXd out(flow_.size);
+        out << u.head(flow_.nodes), u.tail(flow_.size - flow_.nodes);
+        return out;
+    }
+    Eigen::VectorXd without_motions(const Eigen::VectorXd& w) const {
+        return w - flow_.none * (flow_.none.transpose() * w);
+    }
+
+    const FlowForm& flow_;
+    const Shifted& factors_;
+    double shift_;
+    Eigen::Index all_;
+};
+
+// Makes the columns orthonormal, and orthogonal to those of Q; fewer where some depend on others. Q times the first,
+// and the columns times the second, are what was given.
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> orthonormalise(Eigen::MatrixXd& z, const Eigen::MatrixXd& Q) {
+    Eigen::MatrixXd parts = Eigen::MatrixXd::Zero(Q.cols(), z.cols()),
+                    factor = Eigen::MatrixXd::Identity(z.cols(), z.cols());
+    const double before = z.colwise().squaredNorm().maxCoeff();
+    for (int k = 0; k < 2; ++k) {
+        const Eigen::MatrixXd along = Q.transpose() * z;
+        z -= Q * along, parts += along * factor;
+        const Eigenpairs gram = eigenpairs(z.transpose() * z, true);
+        const Eigen::Index some = (gram.values.array() > (k == 0 ? 1e-20 * before : 0)).count();
+        const Eigen::MatrixXd vectors = gram.vectors.rightCols(some);
+        const Eigen::VectorXd norms = gram.values.tail(some).cwiseSqrt();
+        z = (z * vectors * norms.cwiseInverse().asDiagonal()).eval();
+        factor = (norms.asDiagonal() * vectors.transpose() * factor).eval();
+    }
+    return {parts, factor};
+}
+
+// First those that grow, then by size.
+double slowness(std::complex<double> s) {
+    return s.imag() == 0 && s.real() > 0 ? -1 / s.real() : std::abs(s);
+}
+
+// Displacements and velocities that span those of slowest_of_fluid(), by a block of Arnoldi's method that grows until
+// they are found to 2e-4.
+Eigen::MatrixXd span_of_modes(const InvertedFluid& inverse, int count, double shift) {
+    const int block = std::min(count + 2, 12), most = 200 + 10 * count;
+    Eigen::MatrixXd next = inverse.pushed(block), Q(next.rows(), 0), H(0, 0), last;
+    orthonormalise(next, Q);
+    for (;;) {
+        check_pause();
+        const Eigen::Index before = Q.cols(), more = next.cols();
+        Q.conservativeResize(Eigen::NoChange, before + more), Q.rightCols(more) = next;
+        next = inverse(next);
+        const auto [parts, factor] = orthonormalise(next, Q);
+        H.conservativeResize(before + more, before + more);
+        H.bottomRows(more).setZero(), H.rightCols(more) = parts;
+        if (before > 0) H.block(before, before - last.cols(), more, last.cols()) = last;
+        last = factor;
+        const std::optional<ComplexEigenpairs> ritz = general_eigenpairs(H);
+        if (!ritz) throw SolveError("the rates on a space of velocities were not found");
+        std::vector<std::pair<double, Eigen::Index>> order;
+        for (Eigen::Index j = 0; j < H.cols(); ++j)
+            if (const std::complex<double> value = ritz->values[j];
+                std::abs(value) * shift > 1e-10 && value.imag() <= 0)
+                order.emplace_back(slowness(shift + 1.0 / value), j);
+        std::sort(order.begin(), order.end());
+        Eigen::MatrixXd found(Q.rows(), 0);
+        int modes = 0;
+        for (const auto& [place, j] : order) {
+            const Eigen::VectorXcd y = ritz->vectors.col(j);
+            const double residual = (factor * y.tail(more)).norm() / std::abs(ritz->values[j]);
+            if (residual > 0.1) continue;  // nothing that is there
+            const Eigen::VectorXcd z = Q * y;
+            if (!inverse.is_shape(z)) continue;
+            if (residual > 2e-4) break;
+            const bool pair = ritz->values[j].imag() != 0;
+            found.conservativeResize(Eigen::NoChange, found.cols() + 1 + pair);
+            found.rightCols(1) = z.real();
+            if (pair) found.col(found.cols() - 2) = z.imag();
+            if (++modes == count) return found;
+        }
+        if (next.cols() == 0 || Q.cols() > most) throw SolveError("the slowest modes of the fluid were not found");
+    }
+}
+
 }  // namespace
+
+void set_errors(const SurfaceSpectrum& coarse, int coarse_triangles, SurfaceSpectrum& fine, int fine_triangles,
+                int order) {
+    const Eigen::Index count = fine.values.size();
+    if (coarse.values.size() != count) return;
+    Eigen::VectorXd values = coarse.values, frequencies = coarse.frequencies;
+    // Rates whose real parts are nearly the same may change places.
+    for (Eigen::Index i = 0; i < frequencies.size(); ++i) {
+        const auto apart = [&](Eigen::Index j) {
+            return std::hypot(values[j] - fine.values[i], frequencies[j] - fine.frequencies[i]);
+        };
+        Eigen::Index nearest = i;
+        for (Eigen::Index j = i + 1; j < count; ++j)
+            if (apart(j) < apart(nearest)) nearest = j;
+        std::swap(values[i], values[nearest]), std::swap(frequencies[i], frequencies[nearest]);
+    }
+    fine.errors = errors_between(values, coarse_triangles, fine.values, fine_triangles, order);
+    if (frequencies.size() > 0)
+        fine.frequency_errors = errors_between(frequencies, coarse_triangles, fine.frequencies, fine_triangles, order);
+}
 
 Eigen::VectorXd errors_between(const Eigen::VectorXd& coarse, int coarse_triangles, const Eigen::VectorXd& fine,
                                int fine_triangles, int order) {
@@ -312,6 +488,43 @@ SurfaceSpectrum lowest_of_flow(const FlowForm& flow, int count, double scale) {
     out.values.resize(count), out.vectors.resize(flow.size, count);
     for (int i = 0; i < count; ++i)
         out.values[i] = 1 / order[i].first - scale, out.vectors.col(i) = found.w.col(order[i].second);
+    return out;
+}
+
+SurfaceSpectrum slowest_of_fluid(const FlowForm& flow, int count, double scale) {
+    count = static_cast<int>(std::min<Eigen::Index>(count, flow.size / 4));
+    std::optional<Shifted> factors;
+    for (int k = 0;; ++k, scale *= 4) {
+        check_pause();
+        ConstrainedForm T = flow.form;
+        T.form += scale * scale * flow.inertia;
+        factors.emplace(T, flow.ordering, -scale, BorderedLdlt::Otherwise::lu);
+        if (factors->pivoted() || factors->negative() == flow.multipliers) break;
+        if (k == 10) throw SolveError("the rates have no bound that could be found");
+    }
+    const InvertedFluid inverse(flow, *factors, scale);
+    const Eigen::MatrixXd z = span_of_modes(inverse, count, scale);
+    const ComplexEigenpairs found = inverse.rates_on(z);
+    std::vector<Eigen::Index> order;
+    for (Eigen::Index j = 0; j < z.cols(); ++j)
+        if (found.values[j].imag() >= 0) order.push_back(j);
+    count = static_cast<int>(std::min<std::size_t>(order.size(), count));
+    std::sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
+        const std::complex<double> s = found.values[a], t = found.values[b];
+        return std::pair(-s.real(), s.imag()) < std::pair(-t.real(), t.imag());
+    });
+    SurfaceSpectrum out;
+    if (factors->pivoted()) out.doubt = "the number of rates could not be counted";
+    out.values.resize(count), out.frequencies.resize(count), out.vectors.resize(flow.size, count);
+    for (int i = 0; i < count; ++i) {
+        const std::complex<double> s = found.values[order[i]];
+        out.values[i] = -s.real(), out.frequencies[i] = s.imag();
+        Eigen::VectorXcd w = z.topRows(flow.size) * found.vectors.col(order[i]);
+        Eigen::Index largest = 0;
+        w.cwiseAbs().maxCoeff(&largest);
+        w *= std::abs(w[largest]) / w[largest];
+        out.vectors.col(i) = w.real();
+    }
     return out;
 }
 

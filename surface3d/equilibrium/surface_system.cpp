@@ -1,5 +1,7 @@
 #include "surface3d/equilibrium/surface_system.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -510,7 +512,12 @@ SurfaceSpectrum SurfaceSystem::modes(const Eigen::VectorXd& u, const MotionLaw& 
     const FlowForm flow = flow_form(A, space(), at, directions_.normal, law, rigid_motions(at), stiffness(u));
     // That of a sphere has modes of this friction, or less.
     const double drag = law.friction + 16 * pi * law.viscosity / d.values.area;
-    SurfaceSpectrum out = lowest_of_flow(flow, count, still.values.cwiseAbs().maxCoeff() / drag);
+    const double G = still.values.cwiseAbs().maxCoeff(), slow = 2 * G / (drag + std::sqrt(drag * drag + 4 * G));
+    SurfaceSpectrum out =
+        law.inertia == 0 ? lowest_of_flow(flow, count, G / drag) : slowest_of_fluid(flow, count, slow);
+    const auto growing = static_cast<int>((out.values.array() < 1e-4 * slow).count());
+    if (law.inertia != 0 && growing < std::min(count, still.negative))
+        out.doubt = fmt::format("{} rates grow, {} by the inertia of the form", growing, still.negative);
     out.negative = index(u);
     if (out.doubt.empty()) out.doubt = std::move(still.doubt);
     return out;

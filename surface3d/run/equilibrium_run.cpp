@@ -99,6 +99,16 @@ SeriesTable<Row> shape_series(const Problem& c) {
         const Eigen::VectorXd& errors = r.shape.spectrum.errors;
         return static_cast<Eigen::Index>(i) < errors.size() ? errors[i] : -1.0;
     });
+    if (c.law.inertia != 0 && c.law.inextensible) {
+        table.add_family("frequency_<i>", numbers, [](const Row& r, std::size_t i) {
+            const Eigen::VectorXd& values = r.shape.spectrum.frequencies;
+            return static_cast<Eigen::Index>(i) < values.size() ? values[i] : 0.0;
+        });
+        table.add_family("frequency_error_<i>", numbers, [](const Row& r, std::size_t i) {
+            const Eigen::VectorXd& errors = r.shape.spectrum.frequency_errors;
+            return static_cast<Eigen::Index>(i) < errors.size() ? errors[i] : -1.0;
+        });
+    }
     table.add_family("wave_number_<i>", numbers, [](const Row& r, std::size_t i) {
         return i < r.shape.wave_numbers.size() ? r.shape.wave_numbers[i] : -1.0;
     });

@@ -8,11 +8,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
+#include <optional>
+#include <utility>
 
 #include "common/equilibrium/newton.hpp"
 #include "common/geometry/profile_point.hpp"
 #include "common/shapes/torus.hpp"
 #include "common/solve/dense.hpp"
+#include "common/solve/parallel.hpp"
 #include "common/theory/dispersion.hpp"
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
@@ -117,6 +121,25 @@ TEST(SurfaceSpectrum, sphere) {
     }
 }
 
+using Roots = std::vector<std::complex<double>>;
+
+// The slowest of `expected`, pairs as one, in the order of SurfaceSpectrum.
+void expect_rates(const SurfaceSystem& system, const Eigen::VectorXd& u, const MotionLaw& law, int count,
+                  Roots expected, double tolerance) {
+    multiply_on_one_thread();
+    const SurfaceSpectrum s = system.modes(u, law, count);
+    EXPECT_EQ(s.doubt, "");
+    ASSERT_EQ(s.values.size(), count);
+    std::sort(expected.begin(), expected.end(), [](auto a, auto b) { return std::abs(a) < std::abs(b); });
+    expected.resize(count);
+    std::sort(expected.begin(), expected.end(), [](auto a, auto b) { return a.real() > b.real(); });
+    for (int i = 0; i < count; ++i) {
+        const std::complex<double> found(-s.values[i], law.inertia != 0 ? s.frequencies[i] : 0);
+        EXPECT_LT(std::abs(found - expected[i]), tolerance * std::abs(expected[i]))
+            << i << ": " << found << " for " << expected[i];
+    }
+}
+
 // Spheres about a particle and waves on them, theory.md (2.22), as in tests/axisym/potential_test.cpp: three turns
 // about it are free. With a plane beside it only the turn about the axis is.
 TEST(SurfaceSpectrum, sphereAboutAParticle) {
@@ -152,6 +175,14 @@ TEST(SurfaceSpectrum, sphereAboutAParticle) {
                                (2 + l * (l + 1)) * W / (R * R));
     std::sort(expected.begin(), expected.end());
     for (int i = 0; i < 9; ++i) EXPECT_NEAR(s.values[i], expected[i], 2e-3 * std::abs(expected[i])) << i;
+    // Friction alone: translations, and l = 2 by (6.6).
+    Roots rates;
+    for (int l = 1; l <= 2; ++l) {
+        const double G =
+            (l == 1 ? 0 : theory::stiffness(sphere, l)) + W2 + 4 * W1 / R + (2 + l * (l + 1)) * W / (R * R);
+        rates.insert(rates.end(), 2 * l + 1, -G / 0.8 * l * (l + 1) / (l * (l + 1) + 4));
+    }
+    expect_rates(system, u, {.friction = 0.8}, 8, rates, 6e-3);
 
     Bending both = bending;
     both.potentials.push_back({.z = -3, .strength = 1, .range = 0.5});
@@ -209,7 +240,8 @@ TEST(SurfaceEquilibrium, beadsNeedFineMeshes) {
     EXPECT_CONTAINS(e.message, "times model.bead_width apart");
 }
 
-// Exact: theory.md (6.5), (6.6), 2 l + 1 times each, under a pressure; friction, viscosity, or both resist.
+// Exact: theory.md (6.5) to (6.8), 2 l + 1 times each, under a pressure; friction, viscosity, or both resist. With
+// inertia the wave Y_l^m is an oscillator, (l (l + 1) + 4) s^2 + .. s + l (l + 1) G = 0: first underdamped, then not.
 TEST(SurfaceFlow, sphere) {
     const Bending bending{.k = {0.5, 0.02, 0.06}, .H0 = -0.3};
     const theory::UniformSphere sphere{bending};
@@ -219,11 +251,77 @@ TEST(SurfaceFlow, sphere) {
     Eigen::VectorXd u = system.unknowns_at_base();
     int iterations = 0;
     ASSERT_TRUE(Newton(system, u, iterations).converge(0.1));
+    for (const MotionLaw& law :
+         {MotionLaw{.friction = 0.8}, MotionLaw{.viscosity = 0.5, .friction = 0.3}, MotionLaw{.viscosity = 0.5},
+          MotionLaw{.inertia = 1, .viscosity = 0.5, .friction = 0.3}, MotionLaw{.inertia = 1, .viscosity = 20}})
+        expect_rates(system, u, law, 5, Roots(5, theory::growth(sphere, law, 2).roots.front()), 6e-3);
+}
+
+// A straight tube under tension and pressure.
+struct TubeAtRest {
+    static constexpr double length = 5;
+    const Bending bending{.k = {0.5, 0, 0.1}};
+    const theory::UniformTube tube{bending, 1, 0.6};
+    const double P = theory::pressure_at_rest(tube);
+    std::optional<SurfaceSystem> system;
+    Eigen::VectorXd u;
+
+    explicit TubeAtRest(bool free_period);
+    Roots waves(const MotionLaw& law) const;
+};
+
+TubeAtRest::TubeAtRest(bool free_period) {
+    const CurvedMesh mesh = mapped_mesh(tube_rings(1, length, 10, 8), 4, [](const Eigen::Vector3d& p) {
+        const double r = p.head<2>().norm();
+        return Eigen::Vector3d(p.x() / r, p.y() / r, p.z());
+    });
+    StationaryProblem problem{bending, {}};
+    problem.loads.tension = tube.tension, problem.loads.pressure = P;
+    if (free_period) {
+        problem.free_period = true, problem.loads.tension = 0, problem.constraints.area = 2 * pi * length;
+        problem.loads.force = theory::axial_force(tube, P);
+    }
+    system.emplace(mesh, problem);
+    u = system->unknowns_at_base();
+    u[system->sigma()] = tube.tension;
+    int iterations = 0;
+    EXPECT_TRUE(Newton(*system, u, iterations).converge(0.1));
+}
+
+// Two each (four with m > 0): theory.md (5.10), (5.12).
+Roots TubeAtRest::waves(const MotionLaw& law) const {
+    Roots out;
+    for (int m = 0; m < 4; ++m)
+        for (int n = 0; n < 4; ++n)
+            if (n > 0 || m > 1)
+                out.insert(out.end(), (m > 0 ? 2 : 1) * (n > 0 ? 2 : 1),
+                           theory::growth(tube, law, 2 * pi * n / length, m).roots.front());
+    return out;
+}
+
+TEST(SurfaceFlow, straightTube) {
+    const TubeAtRest at(false);
     for (const MotionLaw& law : {MotionLaw{.friction = 0.8}, MotionLaw{.viscosity = 0.5, .friction = 0.3},
-                                 MotionLaw{.viscosity = 0.5, .friction = 0}}) {
-        const SurfaceSpectrum s = system.modes(u, law, 5);
-        EXPECT_EQ(s.doubt, "");
-        for (int i = 0; i < 5; ++i) EXPECT_NEAR(s.values[i] / -theory::growth(sphere, law, 2).rate(), 1, 6e-3) << i;
+                                 MotionLaw{.inertia = 1, .viscosity = 0.5, .friction = 0.3}})
+        expect_rates(*at.system, at.u, law, 6, at.waves(law), 5e-3);
+    // A reservoir that feeds a free volume lets the radius relax against friction and 2 viscosity/R^2.
+    const MotionLaw law{.viscosity = 0.5, .friction = 0.3, .keeps_volume = false, .reservoir = true};
+    Roots expected = at.waves(law);
+    expected.emplace_back(-theory::stiffness(at.tube, 0)(0) / (law.friction + 2 * law.viscosity));
+    expect_rates(*at.system, at.u, law, 3, expected, 5e-3);
+}
+
+// A free period of a given area relaxes with R' = -R e' and L' = L e' against friction R^2 and 4 viscosity, the
+// stiffness being f_HH/R^2 - pressure R, per area; u.nu has inertia.
+TEST(SurfaceFlow, tubeOfFreePeriod) {
+    const TubeAtRest at(true);
+    for (const double inertia : {0.0, 1.0}) {
+        const MotionLaw law{
+            .inertia = inertia, .viscosity = 0.5, .friction = 0.3, .keeps_volume = false, .free_period = true};
+        Roots expected = at.waves(law);
+        const double stiffness = 2 * at.bending.k[0] - at.P, drag = law.friction + 4 * law.viscosity;
+        expected.emplace_back(inertia == 0 ? -stiffness / drag : (std::sqrt(drag * drag - 4 * stiffness) - drag) / 2);
+        expect_rates(*at.system, at.u, law, 3, expected, 5e-3);
     }
 }
 

@@ -53,7 +53,6 @@ const std::vector<Refused> refused{
      "a closed surface or a tube"},
     {equilibrium, {"equilibrium.rates=2"}, "tier = \"surface3d\""},
     {equilibrium, {"model.kind=fluid", "equilibrium.modes=2"}, "a model without inertia"},
-    {surface_equilibrium, {"model.kind=fluid", "equilibrium.rates=2"}, "a model without inertia"},
     {equilibrium, {"shape={kind=\"torus\", radius=2, tube_radius=1}"}, "a motion, without [equilibrium]"},
     {surface, {"model.kind=fluid"}, "a table [time]"},
     {axisym, {"model.Re=1"}, "model.kind = \"stokes\" or"},

@@ -78,6 +78,7 @@ struct SlowMode {
     double rate;
     int m;
     double error = -1;  // estimated; -1: unknown
+    double frequency = 0, frequency_error = -1;
 };
 // Rows of a table of them.
 std::string words_of_modes(const std::vector<SlowMode>& modes, const std::optional<Scales>& scales);

@@ -1,6 +1,7 @@
 // The slowest modes of a stationary surface in three dimensions.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <span>
 #include <stdexcept>
@@ -23,15 +24,10 @@ struct SurfaceModes {
     std::vector<SlowMode> modes;           // slowest first
 };
 
-bool flows_without_inertia(const Model& model) {
-    return model_entry(model.kind).inextensible && model.kind != ModelKind::fluid;
-}
-
-// The surface that the case looks for, or that nearest to the frame, with what the case holds. A fluid, whose inertia
-// the rates would neglect, is asked for those of gradient flow: the signs are the same.
+// The surface that the case looks for, or that nearest to the frame, with what the case holds.
 Problem problem_of(const StabilityOptions& options, const StabilitySubject& subject, const Model& model) {
     Case c = subject.c;
-    const bool flows = flows_without_inertia(model);
+    const bool flows = model_entry(model.kind).inextensible;
     if (flows) c.model = model;
     c.tier = Tier::surface3d;
     if (!c.equilibrium) c.equilibrium.emplace();
@@ -41,7 +37,6 @@ Problem problem_of(const StabilityOptions& options, const StabilitySubject& subj
     e.branch = {};
     e.rates = options.rates.value_or(10);
     c.time = {}, c.velocity = {}, c.expect = {};
-    if (c.model.kind == ModelKind::fluid) c.model.kind = ModelKind::stokes;
     CaseInputs inputs;
     if (subject.frame) {
         const ResultFrame frame{.path = std::filesystem::path(options.file).filename().string(),
@@ -68,10 +63,14 @@ SurfaceModes modes_of(const Problem& c) {
     SurfaceModes out;
     const std::vector<std::string> names = surface3d::equilibrium_series_names(c);
     for (std::size_t i = 0; i < names.size(); ++i) out.values[names[i]] = keep.last[i];
-    for (int i = 1; i <= *c.equilibrium->rates; ++i)
-        out.modes.push_back({out.values.at(fmt::format("rate_{}", i)),
-                             static_cast<int>(out.values.at(fmt::format("wave_number_{}", i))),
-                             out.values.at(fmt::format("rate_error_{}", i))});
+    for (int i = 1; i <= *c.equilibrium->rates; ++i) {
+        const auto value = [&](const char* series, double otherwise) {
+            const auto found = out.values.find(fmt::format("{}_{}", series, i));
+            return found == out.values.end() ? otherwise : found->second;
+        };
+        out.modes.push_back({value("rate", 0), static_cast<int>(value("wave_number", -1)), value("rate_error", -1),
+                             value("frequency", 0), value("frequency_error", 0)});
+    }
     return out;
 }
 
@@ -103,13 +102,20 @@ std::string json_text(const SurfaceModes& found, const Json& modes) {
 std::string words_of_modes(const std::vector<SlowMode>& modes, const std::optional<Scales>& scales) {
     const LabUnit rates = lab_unit(scales, "1/time"), times = lab_unit(scales, "time");
     const bool errors = !modes.empty() && modes.front().error >= 0;
-    std::string out = fmt::format("    number    m           rate    e-fold in{}\n", errors ? "     error" : "");
+    const bool oscillate = std::ranges::any_of(modes, [](const SlowMode& mode) { return mode.frequency > 0; });
+    std::string out = fmt::format("    number    m           rate    e-fold in{}{}\n", errors ? "     error" : "",
+                                  oscillate ? "      frequency     error" : "");
     if (scales) add(out, "    {:>6} {:>4} {:>14} {:>12}\n", "", "", rates.name, times.name);
     for (std::size_t i = 0; i < modes.size(); ++i) {
-        const auto& [rate, m, error] = modes[i];
-        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}{}\n", i + 1, m < 0 ? "-" : std::to_string(m),
-            rate * rates.scale, times.scale / std::abs(rate),
-            errors ? fmt::format(" {:>9.1e}", error * rates.scale) : "", rate > 0 ? "  grows" : "");
+        const SlowMode& mode = modes[i];
+        const auto words_of_error = [&](double error) {
+            return error >= 0 ? fmt::format(" {:>9.1e}", error * rates.scale) : fmt::format(" {:>9}", "-");
+        };
+        add(out, "    {:>6} {:>4} {:>14.7g} {:>12.6g}{}{}{}\n", i + 1, mode.m < 0 ? "-" : std::to_string(mode.m),
+            mode.rate * rates.scale, times.scale / std::abs(mode.rate), errors ? words_of_error(mode.error) : "",
+            oscillate ? fmt::format(" {:>14.7g}", mode.frequency * rates.scale) + words_of_error(mode.frequency_error)
+                      : "",
+            mode.rate > 0 ? "  grows" : "");
     }
     return out;
 }
@@ -127,15 +133,20 @@ std::string surface_report(const StabilityOptions& options, const StabilitySubje
     std::vector<SurfaceModes> found;
     Json modes = Json::array();
     for (const Problem& one : models) {
-        if (models.size() > 1 && one.model.kind == ModelKind::fluid) continue;
         found.push_back(modes_of(problem_of(options, subject, one.model)));
-        found.back().model = flows_without_inertia(one.model) ? name(one.model) : "gradient-flow";
+        found.back().model = name(one.model);
         int number = 0;
-        for (const auto& [rate, m, error] : found.back().modes)
-            modes.push_back(
-                {{"model", found.back().model}, {"number", ++number}, {"m", m}, {"rate", rate}, {"rate_error", error}});
+        for (const SlowMode& mode : found.back().modes)
+            modes.push_back({{"model", found.back().model},
+                             {"number", ++number},
+                             {"m", mode.m},
+                             {"rate", mode.rate},
+                             {"rate_error", mode.error},
+                             {"frequency", mode.frequency},
+                             {"frequency_error", mode.frequency_error}});
     }
-    if (options.csv) return csv_of({"model", "number", "m", "rate", "rate_error"}, modes);
+    if (options.csv)
+        return csv_of({"model", "number", "m", "rate", "rate_error", "frequency", "frequency_error"}, modes);
     if (options.json) return json_text(found.front(), modes);
     std::string out;
     for (const SurfaceModes& one : found) out += words_of(one, known_scales(subject.c));
