@@ -16,6 +16,9 @@ namespace {
 constexpr double refinement = 1.8;  // triangles of a mesh over those of the one before
 constexpr double least_quality = 0.3;
 constexpr int most_attempts = 5;  // meshes on which no shape is found
+// The error of an energy over that of the penalty: on 19 meshes 1.9 to 5.4, above 3.3 only where the energies of meshes
+// differ by more.
+constexpr double error_of_kinks = 3.5;
 
 CurvedMesh scaled_to(CurvedMesh mesh, const StationaryProblem& problem) {
     const Constraints& c = problem.constraints;
@@ -94,10 +97,10 @@ private:
             return;
         }
         if (before_) {
-            // What the edges carry is no larger than the error of the next coarser mesh.
+            // A mesh may be no better than the coarser one, but its edges say so.
             const double apart = error_since(Eigen::VectorXd::Constant(1, before_->energy),
                                              Eigen::VectorXd::Constant(1, energy_of(system, u)))[0];
-            out_.estimated_error = std::max(apart, out_.values.kinks) / out_.reference_energy;
+            out_.estimated_error = std::max(apart, error_of_kinks * out_.values.kinks) / out_.reference_energy;
         }
     }
 

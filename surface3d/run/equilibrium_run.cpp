@@ -73,6 +73,25 @@ std::array<double, 2> height_and_radius(const CurvedMesh& mesh) {
     return {mesh.period > 0 ? mesh.period : high - low, r};
 }
 
+// Those of modes: rate_<i>, its error, and of fluids frequencies.
+void add_rates(const Problem& c, SeriesTable<Row>& table) {
+    std::vector<std::string> numbers;
+    for (int i = 1; i <= c.equilibrium->rates.value_or(0); ++i) numbers.push_back(std::to_string(i));
+    const auto add = [&](SeriesName name, Eigen::VectorXd SurfaceSpectrum::*of, double sign, double otherwise) {
+        table.add_family(name, numbers, [=](const Row& r, std::size_t i) {
+            const Eigen::VectorXd& values = r.shape.spectrum.*of;
+            return static_cast<Eigen::Index>(i) < values.size() ? sign * values[i] : otherwise;
+        });
+    };
+    add("rate_<i>", &SurfaceSpectrum::values, -1, 0), add("rate_error_<i>", &SurfaceSpectrum::errors, 1, -1);
+    if (c.law.inertia != 0 && c.law.inextensible)
+        add("frequency_<i>", &SurfaceSpectrum::frequencies, 1, 0),
+            add("frequency_error_<i>", &SurfaceSpectrum::frequency_errors, 1, -1);
+    table.add_family("wave_number_<i>", numbers, [](const Row& r, std::size_t i) {
+        return i < r.shape.wave_numbers.size() ? r.shape.wave_numbers[i] : -1.0;
+    });
+}
+
 SeriesTable<Row> shape_series(const Problem& c) {
     SeriesTable<Row> table;
     add_first_columns(table, c.equilibrium->branch);
@@ -88,30 +107,10 @@ SeriesTable<Row> shape_series(const Problem& c) {
     if (c.law.beads)
         table.add({{"force", [](const Row& r) { return r.shape.beads.force; }},
                    {"bead_distance", [](const Row& r) { return r.extents.length; }}});
-    table.add({{"negative_directions", [](const Row& r) { return static_cast<double>(r.point.index); }}});
-    std::vector<std::string> numbers;
-    for (int i = 1; i <= c.equilibrium->rates.value_or(0); ++i) numbers.push_back(std::to_string(i));
-    table.add_family("rate_<i>", numbers, [](const Row& r, std::size_t i) {
-        const Eigen::VectorXd& values = r.shape.spectrum.values;
-        return static_cast<Eigen::Index>(i) < values.size() ? -values[i] : 0.0;
-    });
-    table.add_family("rate_error_<i>", numbers, [](const Row& r, std::size_t i) {
-        const Eigen::VectorXd& errors = r.shape.spectrum.errors;
-        return static_cast<Eigen::Index>(i) < errors.size() ? errors[i] : -1.0;
-    });
-    if (c.law.inertia != 0 && c.law.inextensible) {
-        table.add_family("frequency_<i>", numbers, [](const Row& r, std::size_t i) {
-            const Eigen::VectorXd& values = r.shape.spectrum.frequencies;
-            return static_cast<Eigen::Index>(i) < values.size() ? values[i] : 0.0;
-        });
-        table.add_family("frequency_error_<i>", numbers, [](const Row& r, std::size_t i) {
-            const Eigen::VectorXd& errors = r.shape.spectrum.frequency_errors;
-            return static_cast<Eigen::Index>(i) < errors.size() ? errors[i] : -1.0;
-        });
-    }
-    table.add_family("wave_number_<i>", numbers, [](const Row& r, std::size_t i) {
-        return i < r.shape.wave_numbers.size() ? r.shape.wave_numbers[i] : -1.0;
-    });
+    table.add({{"negative_directions", [](const Row& r) {
+                    return r.shape.stop == Stop::finished ? static_cast<double>(r.point.index) : -1.0;
+                }}});
+    add_rates(c, table);
     table.add({{"height", [](const Row& r) { return r.height; }},
                {"r_max", [](const Row& r) { return r.r_max; }},
                {"quality", [](const Row& r) { return mesh_quality(r.shape.mesh).worst; }}});
