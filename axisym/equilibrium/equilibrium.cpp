@@ -151,23 +151,7 @@ Eigen::SparseMatrix<double> StationarySystem::jacobian(const Eigen::VectorXd& u,
         corner.block<4, 4>(4, 4) = s.equations_by_numbers;
     }
     columns.rightCols(rim_.cols()) = rim_, rows.bottomRows(rim_.cols()) = rim_.transpose();
-
-    // Columns in order, each with the rows of the Hessian and then all others, zeros included.
-    Eigen::SparseMatrix<double> J(unknowns(), unknowns());
-    J.reserve(hessian.nonZeros() + 2 * more * n + more * more);
-    for (int j = 0; j < n; ++j) {
-        J.startVec(j);
-        for (Eigen::SparseMatrix<double>::InnerIterator it(hessian, j); it; ++it)
-            J.insertBack(it.row(), j) = it.value();
-        for (int i = 0; i < more; ++i) J.insertBack(n + i, j) = rows(i, j);
-    }
-    for (int j = 0; j < more; ++j) {
-        J.startVec(n + j);
-        for (int i = 0; i < n; ++i) J.insertBack(i, n + j) = columns(i, j);
-        for (int i = 0; i < more; ++i) J.insertBack(n + i, n + j) = corner(i, j);
-    }
-    J.finalize();
-    return J;
+    return bordered(hessian, columns, rows, corner);
 }
 
 // Zero where nothing depends on it.
@@ -294,7 +278,7 @@ std::vector<double> next_breaks(const CurveSpace& space, const std::vector<doubl
     return regraded(breaks, std::min({wanted, 2 * elements, max_elements}));
 }
 
-// Why no shape was found, from the first one and the last of a descent.
+// From the first shape and the last of a search.
 std::string why_none(const Constraints& goal, const CurveObservation& first, const CurveObservation& last,
                      bool descended, int iterations) {
     const double symbol = std::min(first.symbol, last.symbol);
@@ -303,22 +287,11 @@ std::string why_none(const Constraints& goal, const CurveObservation& first, con
             "the energy has no minimum there: ever shorter waves lower it (its principal symbol falls "
             "to {:.3g}; see the moduli in [energy])",
             symbol);
-    std::string missed;
-    if (descended) missed = missed_constraint(goal, first.area, first.volume, last.area, last.volume);
-    return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
+    return tubule::why_none(goal, {first.area, first.volume, 0}, {last.area, last.volume, 0}, descended, iterations);
 }
 
 double free_energy(const StationaryProblem& problem, const CurveObservation& o, double length) {
     return o.energy + problem.loads.energy(o.area, o.volume, length);
-}
-
-// E_ref, theory.md (11.1).
-double reference_energy_of(const StationaryProblem& problem, const CurveForms& forms, const Eigen::VectorXd& x,
-                           double length) {
-    const CurveObservation o = forms.observe(x);
-    const Loads& loads = problem.loads;
-    return std::max(std::abs(free_energy(problem, o, length)),
-                    forms.reference_energy(x) + loads.scale(o.area, o.volume, length));
 }
 
 // The radius of the narrowest neck of a closed curve; infinite where it has none.
@@ -415,15 +388,15 @@ Equilibrium solve(const StationaryProblem& problem, std::shared_ptr<const CurveS
         StationarySystem system(space, problem, gauge);
         const int n = space->size(), elements = space->splines().elements();
         out.space = space, out.x = u.head(n), out.gauge = gauge;
-        if (round == 0) first = last = out.observed = system.forms().observe(out.x);
         out.length = system.length(u);
-        out.reference_energy = reference_energy_of(problem, system.forms(), out.x, out.length);
+        const CurveObservation at = system.forms().observe(out.x);
+        out.reference_energy = reference_energy(problem, at.energy, system.forms().reference_energy(out.x),
+                                                {at.area, at.volume, out.length});
+        if (round == 0) first = last = out.observed = at;
         if (round == 0 && space->closed() && begins_at_sphere(problem.constraints, first.area, first.volume, 1e-6)) {
             out.estimated_error = 1;
-            return end(
-                Stop::solver_failed,
-                "a sphere leads to no other area and volume, since all directions are alike: start at a spheroid "
-                "or a sphere with waves, or by equilibrium.family");
+            return end(Stop::solver_failed,
+                       why_no_sphere("a spheroid or a sphere with waves, or by equilibrium.family"));
         }
         found = settle(system, u, !found, settings.descend, out.iterations);
         const Eigen::VectorXd x = u.head(n);

@@ -389,8 +389,7 @@ double Forms::reference_energy(const Eigen::VectorXd& x) const {
             }
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(x.size());
     const Observation o = observe(x.data(), rest.data());
-    return std::max(std::abs(o.free_energy), images_ * magnitude + o.energy_kg + std::abs(loads_.tension) * o.area +
-                                                 std::abs(loads_.pressure) * o.volume);
+    return std::max(std::abs(o.free_energy), images_ * magnitude + o.energy_kg + loads_.scale(o.area, o.volume, 0));
 }
 
 std::array<Eigen::VectorXd, 2> Forms::mode(int n) const {

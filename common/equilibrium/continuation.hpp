@@ -262,20 +262,7 @@ private:
         const Eigen::VectorXd u = w.head(n);
         const Eigen::VectorXd column = (residual(u, w[n] + h) - residual(u, w[n] - h)) / (2 * h);
         tier_.system().set_problem(problem_at(w[n]));
-        const Eigen::SparseMatrix<double> J = tier_.system().jacobian(u, 0);
-        Eigen::SparseMatrix<double> out(n + 1, n + 1);
-        out.reserve(J.nonZeros() + 2 * n + 1);
-        for (int j = 0; j <= n; ++j) {
-            out.startVec(j);
-            if (j < n)
-                for (Eigen::SparseMatrix<double>::InnerIterator it(J, j); it; ++it)
-                    out.insertBack(it.row(), j) = it.value();
-            else
-                for (int i = 0; i < n; ++i) out.insertBack(i, j) = column[i];
-            out.insertBack(n, j) = row[j];
-        }
-        out.finalize();
-        return out;
+        return bordered(tier_.system().jacobian(u, 0), column, row.head(n).transpose(), row.tail(1));
     }
 
     // The direction of the branch on the side of `along`.

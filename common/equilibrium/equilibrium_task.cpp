@@ -14,76 +14,61 @@ double volume_at(double area, double reduced_volume) {
     return reduced_volume * area * std::sqrt(area) / (6 * std::sqrt(pi));
 }
 
-SetParameter setter(int parameter) {
-    if (parameter >= 0)
-        return [parameter](StationaryProblem& p, double value) { modulus(p.bending, parameter) = value; };
-    if (parameter <= vary_strength)
-        return [i = vary_strength - parameter](StationaryProblem& p, double value) {
-            p.bending.potentials[i].strength = value;
-        };
+namespace {
+
+// Where the problem has the number; none if it follows from others.
+double* number_of(int parameter, StationaryProblem& p) {
+    const auto held = [](std::optional<double>& value) { return &(value ? *value : value.emplace(0)); };
+    if (parameter >= 0) return &modulus(p.bending, parameter);
+    if (parameter <= vary_strength) return &p.bending.potentials[vary_strength - parameter].strength;
     switch (parameter) {
         case vary_H0:
-            return [](StationaryProblem& p, double value) { p.bending.H0 = value; };
+            return &p.bending.H0;
         case vary_kg:
-            return [](StationaryProblem& p, double value) { p.bending.kg = value; };
+            return &p.bending.kg;
         case vary_alpha:
-            return [](StationaryProblem& p, double value) { p.bending.alpha = value; };
+            return held(p.bending.alpha);
         case vary_M0:
-            return [](StationaryProblem& p, double value) { p.bending.M0 = value; };
+            return &p.bending.M0;
         case vary_area:
-            return [](StationaryProblem& p, double value) { p.constraints.area = value; };
+            return held(p.constraints.area);
         case vary_volume:
-            return [](StationaryProblem& p, double value) { p.constraints.volume = value; };
+            return held(p.constraints.volume);
         case vary_tension:
-            return [](StationaryProblem& p, double value) { p.loads.tension = value; };
+            return &p.loads.tension;
         case vary_pressure:
-            return [](StationaryProblem& p, double value) { p.loads.pressure = value; };
+            return &p.loads.pressure;
         case vary_force:
-            return [](StationaryProblem& p, double value) { p.loads.force = value; };
-        case vary_extension:
-            return [](StationaryProblem& p, double value) { p.beads->extension = Ramp(value); };
-        case vary_height:
-            return [](StationaryProblem& p, double value) { p.rings.back().z = p.rings.front().z + value; };
+            return &p.loads.force;
         default:
-            return [](StationaryProblem& p, double value) {
-                if (p.constraints.area)
-                    p.constraints.volume = volume_at(*p.constraints.area, value);
-                else
-                    p.constraints.reduced_volume = value;
-            };
+            return nullptr;
     }
 }
 
-double parameter_value(int parameter, const StationaryProblem& p) {
-    if (parameter >= 0) return modulus(p.bending, parameter);
-    if (parameter <= vary_strength) return p.bending.potentials[vary_strength - parameter].strength;
+}  // namespace
+
+SetParameter setter(int parameter) {
+    return [parameter](StationaryProblem& p, double value) {
+        Constraints& c = p.constraints;
+        if (double* number = number_of(parameter, p))
+            *number = value;
+        else if (parameter == vary_extension)
+            p.beads->extension = Ramp(value);
+        else if (parameter == vary_height)
+            p.rings.back().z = p.rings.front().z + value;
+        else if (c.area)
+            c.volume = volume_at(*c.area, value);
+        else
+            c.reduced_volume = value;
+    };
+}
+
+double parameter_value(int parameter, StationaryProblem p) {
     const Constraints& c = p.constraints;
-    switch (parameter) {
-        case vary_H0:
-            return p.bending.H0;
-        case vary_kg:
-            return p.bending.kg;
-        case vary_alpha:
-            return *p.bending.alpha;
-        case vary_M0:
-            return p.bending.M0;
-        case vary_area:
-            return *c.area;
-        case vary_volume:
-            return *c.volume;
-        case vary_tension:
-            return p.loads.tension;
-        case vary_pressure:
-            return p.loads.pressure;
-        case vary_force:
-            return p.loads.force;
-        case vary_extension:
-            return p.beads->extension->at(0);
-        case vary_height:
-            return p.rings.back().z - p.rings.front().z;
-        default:
-            return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
-    }
+    if (const double* number = number_of(parameter, p)) return *number;
+    if (parameter == vary_extension) return p.beads->extension->at(0);
+    if (parameter == vary_height) return p.rings.back().z - p.rings.front().z;
+    return c.reduced_volume ? *c.reduced_volume : reduced_volume(*c.area, *c.volume);
 }
 
 StationaryProblem stationary_problem(const Problem& c, double area, double volume) {

@@ -19,7 +19,7 @@ double volume_at(double area, double reduced_volume);
 using SetParameter = std::function<void(StationaryProblem&, double)>;
 SetParameter setter(int parameter);
 // Its value in the problem.
-double parameter_value(int parameter, const StationaryProblem& p);
+double parameter_value(int parameter, StationaryProblem p);
 
 // The parameters at which shapes of the branch are asked for, in order, from the problem's value to
 // equilibrium.branch's end. Throws CaseError where these are none, or too many.

@@ -114,6 +114,12 @@ double constraint_error(const Constraints& c, const MultiplierEquations& equatio
     return std::max(area, volume);
 }
 
+double reference_energy(const StationaryProblem& problem, double energy, double magnitude, const Extents& at) {
+    const Loads& loads = problem.loads;
+    return std::max(std::abs(energy + loads.energy(at.area, at.volume, at.length)),
+                    magnitude + loads.scale(at.area, at.volume, at.length));
+}
+
 // The volume of a patch and the distance of its bead may be zero: from there they change by equal steps.
 StationaryProblem between(const StationaryProblem& goal, const Extents& from, double part) {
     const auto on_the_way = [&](const std::optional<double>& wanted, double is) -> std::optional<double> {
@@ -147,11 +153,16 @@ bool begins_at_sphere(const Constraints& goal, double area, double volume, doubl
     return reduced_volume(area, volume) > 1 - rounding && wanted < 1 - rounding;
 }
 
-std::string missed_constraint(const Constraints& goal, double first_area, double first_volume, double area,
-                              double volume) {
+std::string why_no_sphere(const char* shape) {
+    return fmt::format("a sphere leads to no other area and volume, since all directions are alike: start at {}",
+                       shape);
+}
+
+std::string why_none(const Constraints& goal, const Extents& first, const Extents& last, bool descended,
+                     int iterations) {
     std::string missed;
     const auto compare = [&](const char* what, const std::optional<double>& wanted, double from, double to) {
-        if (!wanted) return;
+        if (!wanted || !descended) return;
         const double scale = std::max(std::abs(*wanted), std::abs(from));
         if (!(std::abs(to - *wanted) < 0.01 * scale) && missed.empty())
             missed = fmt::format(
@@ -159,11 +170,11 @@ std::string missed_constraint(const Constraints& goal, double first_area, double
                 "{:.6g}",
                 what, *wanted, from, to);
     };
-    compare("area", goal.area, first_area, area);
-    compare("volume", goal.volume, first_volume, volume);
-    compare("reduced volume", goal.reduced_volume, reduced_volume(first_area, first_volume),
-            reduced_volume(area, volume));
-    return missed;
+    compare("area", goal.area, first.area, last.area);
+    compare("volume", goal.volume, first.volume, last.volume);
+    compare("reduced volume", goal.reduced_volume, reduced_volume(first.area, first.volume),
+            reduced_volume(last.area, last.volume));
+    return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", iterations) : missed;
 }
 
 }  // namespace tubule

@@ -85,6 +85,8 @@ double constraint_error(const Constraints& c, const MultiplierEquations& equatio
 struct Extents {
     double area, volume, length;
 };
+// E_ref of theory.md (11.1), from E and the sum of the magnitudes of its terms.
+double reference_energy(const StationaryProblem& problem, double energy, double magnitude, const Extents& at);
 // The problem part of the way from a shape of these extents to its own constraints, 0 <= part <= 1.
 StationaryProblem between(const StationaryProblem& goal, const Extents& from, double part);
 // How far that is: the largest |log| of a ratio.
@@ -94,9 +96,12 @@ double distance(const StationaryProblem& goal, const Extents& from);
 // one gradient. `rounding`: of the reduced volume of a sphere on the mesh.
 bool begins_at_sphere(const Constraints& goal, double area, double volume, double rounding);
 
-// Why no shape was found, from the area and volume of the first one and of the last: "no shape with volume ..."; else
-// empty.
-std::string missed_constraint(const Constraints& goal, double first_area, double first_volume, double area,
-                              double volume);
+// Words about the latter; `shape`: what to begin with.
+std::string why_no_sphere(const char* shape);
+
+// Why no shape was found after so many iterations of Newton's method, and where the search `descended` from the first
+// shape to the last.
+std::string why_none(const Constraints& goal, const Extents& first, const Extents& last, bool descended,
+                     int iterations);
 
 }  // namespace tubule

@@ -86,7 +86,35 @@ struct FoundShapes {
     Shape last{};
 };
 
-// Hands over the shape, or those of the branch, as they are found, and says how it ended. `Tier` offers
+// Finds the shape, or those of the branch, gives each to `write` and says how it ended; adds what to warn of.
+template <class Tier, class Write>
+StopReport find_shapes(Tier& tier, const Write& write, std::vector<std::string>& warnings) {
+    using Shape = typename Tier::Shape;
+    const auto& task = tier.task();
+    const auto report = [&](const auto& ended, const char* well) {
+        const bool finished = ended.stop == Stop::finished;
+        return StopReport{ended.stop, 0, finished ? well : ended.message, tier.advice(ended.stop)};
+    };
+    BranchPoint<Shape> first;
+    first.shape = tier.find();
+    if (first.shape.stop != Stop::finished || !task.set) {
+        first.parameter = task.branch.from;
+        first.index = first.shape.stop == Stop::finished ? tier.negative_directions(first.shape) : -1;
+        write(first);
+        return report(first.shape, "the shape is stationary");
+    }
+    auto settings = task.branch;
+    settings.found = [&](const BranchPoint<Shape>& point) {
+        write(point);
+        pause_if_due();
+    };
+    Branch<Shape> branch = follow_branches(task.problem, first.shape, task.set, settings,
+                                           [](const auto&... of) { return follow_branch(of...); });
+    warnings = std::move(branch.warnings);
+    return report(branch, "the branch left its parameter interval");
+}
+
+// Hands over the shape, or those of the branch, as they are found, and sums up. `Tier` offers
 //   Shape, task()                the latter a ShapeTask
 //   find()                       the first shape
 //   negative_directions(shape)   of one that was found
@@ -98,13 +126,11 @@ struct FoundShapes {
 template <class Tier>
 RunSummary run_shapes(const Problem& c, Tier& tier, const RunClock& clock, RunObserver& observer) {
     using Shape = typename Tier::Shape;
-    const auto& task = tier.task();
     FoundShapes<Shape> found;
-    RunSummary s;
     const auto write = [&](const BranchPoint<Shape>& point) {
         const Shape& shape = point.shape;
-        StationaryProblem problem = task.problem;
-        if (task.set) task.set(problem, point.parameter);
+        StationaryProblem problem = tier.task().problem;
+        if (tier.task().set) tier.task().set(problem, point.parameter);
         const Extents extents = tier.extents(problem, shape);
         const double energy = tier.energy(shape);
         if (!(extents.area > 0 && std::isfinite(energy))) return;
@@ -115,29 +141,9 @@ RunSummary run_shapes(const Problem& c, Tier& tier, const RunClock& clock, RunOb
         found.last = shape;
         ++found.count;
     };
-    const auto find = [&]() -> StopReport {
-        BranchPoint<Shape> first;
-        first.shape = tier.find();
-        const Stop stop = first.shape.stop;
-        if (stop != Stop::finished || !task.set) {
-            first.parameter = task.branch.from;
-            first.index = stop == Stop::finished ? tier.negative_directions(first.shape) : -1;
-            write(first);
-            return {stop, 0, stop == Stop::finished ? "the shape is stationary" : first.shape.message,
-                    tier.advice(stop)};
-        }
-        auto settings = task.branch;
-        settings.found = [&](const BranchPoint<Shape>& point) {
-            write(point);
-            pause_if_due();
-        };
-        Branch<Shape> branch = follow_branches(task.problem, first.shape, task.set, settings,
-                                               [](const auto&... of) { return follow_branch(of...); });
-        s.warnings = std::move(branch.warnings);
-        return {branch.stop, 0, branch.message, tier.advice(branch.stop)};
-    };
+    RunSummary s;
     try {
-        s.stop = find();
+        s.stop = find_shapes(tier, write, s.warnings);
     } catch (const Paused& pause) {
         if (found.count == 0) throw;
         s.stop = pause_report(pause, 0);

@@ -8,7 +8,6 @@
 #include <Eigen/UmfPackSupport>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <new>
 #include <numeric>
@@ -347,6 +346,24 @@ Ordering nested_dissection(const Matrix& A, const std::vector<int>& node_of_unkn
     for (const int n : node) by_unknown.push_back(position[n]);
     std::stable_sort(ordering.begin(), ordering.end(), [&](int i, int j) { return by_unknown[i] < by_unknown[j]; });
     return ordering;
+}
+
+Eigen::SparseMatrix<double> bordered(const Eigen::SparseMatrix<double>& A, const Eigen::MatrixXd& columns,
+                                     const Eigen::MatrixXd& rows, const Eigen::MatrixXd& corner) {
+    const int n = static_cast<int>(A.cols()), more = static_cast<int>(columns.cols());
+    Eigen::SparseMatrix<double> out(n + more, n + more);
+    out.reserve(A.nonZeros() + 2 * more * n + more * more);
+    for (int j = 0; j < n + more; ++j) {
+        out.startVec(j);
+        if (j < n)
+            for (Eigen::SparseMatrix<double>::InnerIterator it(A, j); it; ++it)
+                out.insertBack(it.row(), j) = it.value();
+        else
+            for (int i = 0; i < n; ++i) out.insertBack(i, j) = columns(i, j - n);
+        for (int i = 0; i < more; ++i) out.insertBack(n + i, j) = j < n ? rows(i, j) : corner(i, j - n);
+    }
+    out.finalize();
+    return out;
 }
 
 }  // namespace tubule

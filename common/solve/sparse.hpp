@@ -20,6 +20,10 @@ struct SolveError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+// [A columns; rows corner], compressed, zeros of the border included.
+Eigen::SparseMatrix<double> bordered(const Eigen::SparseMatrix<double>& A, const Eigen::MatrixXd& columns,
+                                     const Eigen::MatrixXd& rows, const Eigen::MatrixXd& corner);
+
 // The order in which unknowns are eliminated: entry k is the number of the k-th one.
 using Ordering = std::vector<int>;
 

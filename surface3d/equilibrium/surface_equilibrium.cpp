@@ -46,9 +46,7 @@ public:
                 first_ = system.extents(u);
                 keep(system, u);
                 if (out_.mesh.period == 0 && begins_at_sphere(problem_.constraints, first_.area, first_.volume, 1e-4))
-                    return end(Stop::solver_failed,
-                               "a sphere leads to no other area and volume, since all directions are alike: start at "
-                               "an ellipsoid or a sphere with waves");
+                    return end(Stop::solver_failed, why_no_sphere("an ellipsoid or a sphere with waves"));
             }
             if (out_.stop == Stop::finished) u.tail(multipliers_.size()) = multipliers_;
             const bool far = out_.stop != Stop::finished && !settings_.near;
@@ -156,11 +154,7 @@ private:
             return fmt::format(
                 "the mesh of the initial shape has bad triangles (quality {:.2g}) or kinks, or is behind a wall",
                 mesh_quality(out_.mesh).worst);
-        const Extents at = system.extents(u);
-        const std::string missed =
-            missed_constraint(problem_.constraints, first_.area, first_.volume, at.area, at.volume);
-        return missed.empty() ? fmt::format("Newton's method does not converge ({} iterations)", out_.iterations)
-                              : missed;
+        return tubule::why_none(problem_.constraints, first_, system.extents(u), true, out_.iterations);
     }
 
     const StationaryProblem& problem_;
@@ -186,10 +180,7 @@ SurfaceEquilibrium find_equilibrium(const StationaryProblem& problem, const Make
 
 double reference_energy(const StationaryProblem& problem, const SurfaceSystem& system, const Eigen::VectorXd& u) {
     const EnergyValues v = system.values(u);
-    const Loads& loads = problem.loads;
-    const double length = system.length(u);
-    return std::max(std::abs(v.energy + loads.energy(v.area, v.volume, length)),
-                    system.reference_energy(u) + loads.scale(v.area, v.volume, length));
+    return reference_energy(problem, v.energy, system.reference_energy(u), {v.area, v.volume, system.length(u)});
 }
 
 }  // namespace tubule::surface3d

@@ -107,9 +107,7 @@ SeriesTable<Row> shape_series(const Problem& c) {
     if (c.law.beads)
         table.add({{"force", [](const Row& r) { return r.shape.beads.force; }},
                    {"bead_distance", [](const Row& r) { return r.extents.length; }}});
-    table.add({{"negative_directions", [](const Row& r) {
-                    return r.shape.stop == Stop::finished ? static_cast<double>(r.point.index) : -1.0;
-                }}});
+    table.add({{"negative_directions", [](const Row& r) { return static_cast<double>(r.point.index); }}});
     add_rates(c, table);
     table.add({{"height", [](const Row& r) { return r.height; }},
                {"r_max", [](const Row& r) { return r.r_max; }},
