@@ -54,6 +54,7 @@ inline constexpr std::array other_names{
     OtherName{"accuracy", " tol tolerance rtol error ", "energy", "write energy, the asked error relative to E_ref"},
     OtherName{"discretisation", " mesh scheme step relaxation follow_curvature coarsen recovery smoothing ", "",
               "only tier \"surface3d\" has it"},
+    OtherName{"discretisation", " time_order ", "", "write time.max_order, of IDA"},
     OtherName{"discretisation", " smoothness symmetry parametrisation ", "", "only tier \"axisym\" has it"},
     OtherName{"discretisation", " n resolution nodes points triangles n_elements ", "elements",
               "write elements, or leave it out: accuracy.energy decides"}};

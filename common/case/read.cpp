@@ -31,21 +31,6 @@ void merge_terms(Case& c) {
     varied = static_cast<int>(number);
 }
 
-// For one version: discretisation.time_order is read as time.max_order, its new name. Returns where it stood.
-std::string rename_time_order(toml::table& root) {
-    auto *old = root["discretisation"].as_table(), *time = root["time"].as_table();
-    toml::node* order = old ? old->get("time_order") : nullptr;
-    if (!order || !time || root["tier"].value_or<std::string>("") != "axisym" || root.contains("equilibrium"))
-        return {};
-    const std::string where = place(order->source());
-    if (time->contains("max_order"))
-        throw CaseErrors({{where, "discretisation.time_order",
-                           "discretisation.time_order must be absent: time.max_order, its new name, is given", ""}});
-    time->insert("max_order", std::move(*order));
-    old->erase("time_order");
-    return where;
-}
-
 // The first requirement of a given key that the case does not meet.
 void check_requirements(const toml::table& root, const Case& c, Complaints& complaints) {
     const Problem problem(c);
@@ -104,7 +89,6 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
                 const CaseInputs& inputs) {
     toml::table root = parse_toml(text, path);
     for (const std::string& set : sets) apply_override(root, set);
-    const std::string renamed = rename_time_order(root);
 
     Case c = read_keys(root, sets, path, nullptr);
     const auto place = [&] {
@@ -121,7 +105,6 @@ Case parse_case(const std::string& text, const std::vector<std::string>& sets, c
         if (!key.empty()) c.places[key] = tubule::place(node.source());
         return true;
     });
-    if (!renamed.empty()) c.places["discretisation.time_order"] = renamed;
     merge_terms(c);
     std::visit(
         [](auto& shape) {

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
 #include <utility>
@@ -64,26 +63,6 @@ void FileWriter::release() {
     std::error_code none;
     fs::remove(lock_.path(), none);
     lock_ = {};
-}
-
-void warn_of_old_journal(const fs::path& file) {
-    const fs::path journal = with_ending(file, ".journal");
-    if (fs::exists(journal))
-        std::fputs(
-            fmt::format("warning: {}: not read: it has the last rows of a run that was killed under version 0.1, "
-                        "which can go on with it\n",
-                        journal.string())
-                .c_str(),
-            stderr);
-}
-
-void refuse_old_journal(const fs::path& file) {
-    const fs::path journal = with_ending(file, ".journal");
-    if (fs::exists(journal))
-        throw std::runtime_error(fmt::format(
-            "{}: was written by version 0.1: go on with that version, or delete it to give up the last rows "
-            "of this result",
-            journal.string()));
 }
 
 }  // namespace tubule

@@ -38,9 +38,4 @@ private:
     Clock::duration cost_{};
 };
 
-// Version 0.1 had the newest rows and points of a run that was killed in NAME.hdf.journal. If there is one: warns on
-// stderr that it is not read; throws std::runtime_error that only that version can resume with it.
-void warn_of_old_journal(const std::filesystem::path& file);
-void refuse_old_journal(const std::filesystem::path& file);
-
 }  // namespace tubule

@@ -258,7 +258,6 @@ ResultWriter ResultWriter::resume(const fs::path& file, const std::function<void
     if (now) check_case(*now);
     const auto path = resolved(file);
     require_result(path);  // refuse a file that is not a result before changing anything
-    refuse_old_journal(path);
     auto impl = std::make_unique<Impl>(path);
     impl->contents = read_hdf5(path);
     try {
@@ -346,7 +345,6 @@ bool is_point_data(const Array& array, const SurfaceCells& mesh) {
 }
 
 Result read_result(const fs::path& file) {
-    warn_of_old_journal(file);
     return read_hdf5(file);
 }
 

@@ -136,10 +136,6 @@ class Physics(ProgramTest):
                       self.said(sphere.replace("H0 = -1.0", "H0 = 1.0")))  # fmt: skip
         self.assertEqual(self.said(sphere), "")
 
-    def test_the_old_name_of_max_order(self):
-        words = self.said(QUICK, "--set", "discretisation.time_order=3")
-        self.assertIn("--set discretisation.time_order=3: note: discretisation.time_order = 3 is read as time.max_order = 3, its new name", words)
-
     def test_a_balance_that_is_off(self):
         # Waves of the seams are lost on 80 triangles. (A run that estimates its error would make more of them.)
         case = self.write("case.toml", ROUGH.replace("1e-3}", "1e-4, estimate = false}\ndiscretisation = {elements = 80, order = 2}"))

@@ -326,13 +326,6 @@ class Refusals(ScanTest):
         self.assertEqual(self.result.read_bytes(), before)
         self.assertEqual(self.files(), {"case.toml", "scan.hdf"})
 
-    def test_a_journal_of_version_0_1_is_not_given_up_unasked(self):
-        over = ("--over", f"{K42}=0,0.1")
-        self.scan("case.toml", *over)
-        self.write("scan.hdf.journal", "TUBULEJ1")
-        self.assertIn("scan.hdf.journal: was written by version 0.1", self.scan("case.toml", *over, "--resume", status=2)[1])
-        self.assertIn("scan.hdf.journal: not read", self.tubule("show", self.result)[1])
-
 
 class Kill(ScanTest):
     def shown(self):

@@ -521,15 +521,5 @@ TEST_F(Durability, ReadingWhileARunGoesOn) {
     EXPECT_EQ(read_result(file).series.at("time").size(), calls);
 }
 
-TEST_F(Durability, TheJournalOfVersion01IsNamed) {
-    take({create(case_text), frame(0), row(1)}, file);
-    const std::string journal = file.string() + ".journal";
-    std::ofstream(journal) << "TUBULEJ1";
-    testing::internal::CaptureStderr();
-    read_result(file);
-    EXPECT_CONTAINS(testing::internal::GetCapturedStderr(), journal + ": not read");
-    EXPECT_CONTAINS(message_of([&] { ResultWriter::resume(file); }), "go on with that version, or delete it");
-}
-
 }  // namespace durability_test
 }  // namespace tubule

@@ -156,18 +156,10 @@ std::string sign_of_H0(const Problem& c) {
                             c.energy.H0, tube ? "tube" : "sphere", tube ? "-1/radius" : "-2/radius", H, H));
 }
 
-std::string renamed_key(const Problem& c) {
-    if (!c.places.contains("discretisation.time_order")) return {};
-    return note(
-        c, "discretisation.time_order",
-        fmt::format("= {} is read as time.max_order = {}, its new name, of IDA; the next version does not read it",
-                    c.time.max_order, c.time.max_order));
-}
-
 }  // namespace
 
 std::vector<std::string> physics_notes(const Problem& c) {
-    std::vector<std::string> notes{frozen_wave(c), sign_of_H0(c), renamed_key(c)};
+    std::vector<std::string> notes{frozen_wave(c), sign_of_H0(c)};
     std::erase(notes, "");
     return notes;
 }

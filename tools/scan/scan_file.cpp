@@ -374,7 +374,6 @@ ScanWriter ScanWriter::create(const fs::path& file, const Scan& scan, const Abou
 
 ScanWriter ScanWriter::resume(const fs::path& file, const Scan& scan) {
     const auto path = fs::weakly_canonical(file);
-    refuse_old_journal(path);
     ScanResult result = load(path);
     add_inputs(result.scan);
     if (!same_scan(result.scan, scan))
@@ -416,7 +415,6 @@ bool is_scan(const fs::path& file) {
 }
 
 ScanResult read_scan_result(const fs::path& file) {
-    warn_of_old_journal(file);
     return load(file);
 }
 
