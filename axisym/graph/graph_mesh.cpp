@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <set>
 
@@ -71,14 +70,11 @@ std::optional<double> mirror_plane(const std::vector<TubeMode>& modes, double le
 Cell cell_of(const Tube& tube, bool symmetry) {
     if (!symmetry) return {0, tube.length, false, 1};
     std::vector<TubeMode> modes;
-    int waves = 0;
     for (const TubeMode& mode : tube.modes)
-        if (mode.n > 0 && mode.amplitude != 0) {
-            modes.push_back(mode);
-            waves = std::gcd(waves, mode.n);
-        }
+        if (mode.n > 0 && mode.amplitude != 0) modes.push_back(mode);
     if (modes.empty()) return {0, tube.length / 2, true, 1};
     std::sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) { return a.n < b.n; });
+    const int waves = common_waves(tube);
     const double period = tube.length / waves;
     if (const auto z = mirror_plane(modes, tube.length)) return {*z, *z + period / 2, true, waves};
     return {0, period, false, waves};

@@ -40,6 +40,17 @@ Problem::Problem(Case c)
       element_order(surface.order.value_or(default_order(*this))),
       begin_time(handover ? handover->time : 0) {}
 
+bool Problem::runs_in_tier_axisym() const {
+    switch (unknowns) {
+        case Unknowns::graph:
+        case Unknowns::curve:
+        case Unknowns::equilibrium:
+            return true;
+        default:
+            return false;
+    }
+}
+
 Problem Problem::of_profile(double end, std::vector<double> output) const {
     Case out = *this;
     out.tier = Tier::axisym;

@@ -33,7 +33,7 @@ struct Problem : Case {
     double begin_time = 0;  // of a surface that continues a motion of tier axisym
 
     bool is_equilibrium() const { return equilibrium.has_value(); }
-    bool is_axisymmetric() const { return unknowns <= Unknowns::equilibrium; }  // by its tier
+    bool runs_in_tier_axisym() const;  // alone: not where tier "auto" may leave it
     // The case gives elements, tolerance or step: the program must not choose them.
     bool profile_resolution_given() const { return discretisation.elements || discretisation.time_tolerance; }
     bool surface_resolution_given() const { return surface.elements || surface.time_tolerance || surface.step; }

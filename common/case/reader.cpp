@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <regex>
+#include <stdexcept>
 
 #include "common/case/other_names.hpp"
 #include "common/case/overrides.hpp"
@@ -19,7 +19,7 @@ namespace tubule {
 
 namespace {
 
-constexpr double most_in_range = 1e5;
+constexpr std::size_t most_in_range = 100'000;
 constexpr double shortest_ramp = 1e-6;  // of its time: where steps are shorter, the work of a load is inexact
 
 std::string shown(const toml::node& node) {
@@ -56,23 +56,20 @@ std::string meant(const std::string& suggestion) {
     return suggestion.empty() ? "" : fmt::format("; did you mean '{}'?", suggestion);
 }
 
-// The n >= 2 numbers from lo to hi that "lo:hi:n" stands for; nothing if the text has another form.
+// The numbers of a range; nothing if the text has another form.
 std::optional<std::vector<double>> evenly_spaced(const std::string& text) {
-    const std::vector<std::string> parts = split(text, ':');
-    std::vector<double> given;
-    for (const std::string& part : parts) {
-        double value = 0;
-        const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-        if (error != std::errc{} || end != part.data() + part.size() || !std::isfinite(value)) return std::nullopt;
-        given.push_back(value);
+    try {
+        return parse_range(text, most_in_range).evenly();
+    } catch (const std::invalid_argument&) {
+        return std::nullopt;
     }
-    if (given.size() != 3 || !(given[1] > given[0]) || given[2] != std::floor(given[2])) return std::nullopt;
-    if (given[2] < 2 || given[2] > most_in_range) return std::nullopt;
-    std::vector<double> out;
-    const int n = static_cast<int>(given[2]);
-    for (int i = 0; i < n; ++i) out.push_back(given[0] + (given[1] - given[0]) * i / (n - 1));
-    out.back() = given[1];
-    return out;
+}
+
+// Whether it is of the type of the target, which is set then.
+template <class T>
+bool assign(T& target, const toml::node& node) {
+    if (const auto* value = node.as<T>()) target = value->get();
+    return node.is<T>();
 }
 
 std::string lines_of(const std::vector<Complaint>& all) {
@@ -162,23 +159,22 @@ void Reader::refuse(const std::string& key, const std::string& complaint) {
     complaints_.found.push_back({place_of_key, path_of(key), fmt::format("{} {}", path_of(key), complaint), ""});
 }
 
+template <class Take>
+bool Reader::value(const std::string& key, const std::string& what, bool needed, const Take& take) {
+    const toml::node* node = find(key, what, needed);
+    if (node)
+        collect([&] {
+            if (!take(*node)) refuse_value(where(*node), path_of(key), what, *node);
+        });
+    return node != nullptr;
+}
+
 void Reader::flag(const std::string& key, bool& target) {
-    const std::string what = "true or false";
-    const toml::node* node = find(key, what, false);
-    if (!node) return;
-    collect([&] {
-        if (!node->is_boolean()) refuse_value(where(*node), path_of(key), what, *node);
-        target = node->as_boolean()->get();
-    });
+    value(key, "true or false", false, [&](const toml::node& node) { return assign(target, node); });
 }
 
 void Reader::text(const std::string& key, std::string& target, bool needed, const std::string& what) {
-    const toml::node* node = find(key, what, needed);
-    if (!node) return;
-    collect([&] {
-        if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
-        target = node->as_string()->get();
-    });
+    value(key, what, needed, [&](const toml::node& node) { return assign(target, node); });
 }
 
 void Reader::texts(const std::string& key, std::vector<std::string>& target) {
@@ -186,21 +182,17 @@ void Reader::texts(const std::string& key, std::vector<std::string>& target) {
     const toml::node* node = find(key, what, false);
     if (!node) return;
     collect([&] {
-        for (const toml::node& item : as_list(*node, path_of(key), what)) {
-            if (!item.is_string()) refuse_value(where(item), path_of(key), what, item);
-            target.push_back(item.as_string()->get());
-        }
+        for (const toml::node& item : as_list(*node, path_of(key), what))
+            if (!assign(target.emplace_back(), item)) refuse_value(where(item), path_of(key), what, item);
     });
 }
 
 void Reader::formula(const std::string& key, std::shared_ptr<const Formula>& target,
                      std::span<const std::string_view> variables, bool needed) {
     const std::string what = "a formula, such as " + toml_string("0.1*" + std::string(variables.front()) + "^2");
-    const toml::node* node = find(key, what, needed);
-    if (!node) return;
-    collect([&] {
-        if (!node->is_string()) refuse_value(where(*node), path_of(key), what, *node);
-        target = formula_in(*node, key, variables);
+    value(key, what, needed, [&](const toml::node& node) {
+        if (node.is_string()) target = formula_in(node, key, variables);
+        return node.is_string();
     });
 }
 
@@ -216,17 +208,12 @@ std::shared_ptr<const Formula> Reader::formula_in(const toml::node& node, const 
 
 void Reader::number_or_formula(const std::string& key, double& number, std::shared_ptr<const Formula>& formula,
                                std::span<const std::string_view> variables) {
-    const std::string what = "a number, or a formula of " + fmt::format("{}", fmt::join(variables, ", "));
-    const toml::node* node = find(key, what, false);
-    if (!node) return;
-    collect([&] {
-        if (node->is_number())
-            number = number_in(*node, path_of(key), {});
-        else if (node->is_string())
-            formula = formula_in(*node, key, variables);
-        else
-            refuse_value(where(*node), path_of(key), what, *node);
-    });
+    value(key, fmt::format("a number, or a formula of {}", fmt::join(variables, ", ")), false,
+          [&](const toml::node& node) {
+              if (node.is_number()) number = number_in(node, path_of(key), {});
+              if (node.is_string()) formula = formula_in(node, key, variables);
+              return node.is_number() || node.is_string();
+          });
 }
 
 // The place of a character of a string, if the file has it literally, in quotes on one line.
@@ -289,19 +276,13 @@ bool Reader::ramp_or_formula(const std::string& key, Ramp& target, std::shared_p
                              std::span<const std::string_view> variables) {
     std::string what = "a number, or {time = [...], value = [...]}";
     if (!variables.empty()) what += fmt::format(", or a formula of {}", fmt::join(variables, ", "));
-    const toml::node* node = find(key, what, false);
-    if (!node) return false;
-    collect([&] {
-        if (node->is_number())
-            target = number_in(*node, path_of(key), {});
-        else if (node->is_table())
-            ramp_in(*node->as_table(), key, target);
-        else if (node->is_string() && !variables.empty())
-            formula = formula_in(*node, key, variables);
-        else
-            refuse_value(where(*node), path_of(key), what, *node);
+    return value(key, what, false, [&](const toml::node& node) {
+        const bool is_formula = node.is_string() && !variables.empty();
+        if (node.is_number()) target = number_in(node, path_of(key), {});
+        if (node.is_table()) ramp_in(*node.as_table(), key, target);
+        if (is_formula) formula = formula_in(node, key, variables);
+        return node.is_number() || node.is_table() || is_formula;
     });
-    return true;
 }
 
 void Reader::ramp_in(const toml::table& table, const std::string& key, Ramp& target) {

@@ -199,6 +199,9 @@ private:
     void refuse_unknown();
     void refuse(const std::string& key, const std::string& complaint);
 
+    // Whether the key is there. `take` says whether the value is what `what` says, and takes it if so.
+    template <class Take>
+    bool value(const std::string& key, const std::string& what, bool needed, const Take& take);
     std::shared_ptr<const Formula> formula_in(const toml::node& node, const std::string& key,
                                               std::span<const std::string_view> variables) const;
     void ramp_in(const toml::table& table, const std::string& key, Ramp& target);

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
 
 namespace tubule {
 
@@ -118,6 +121,36 @@ std::vector<std::string> split(std::string_view text, char separator) {
     return parts;
 }
 
+std::optional<double> number_of(std::string_view text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+std::vector<double> NumberRange::evenly() const {
+    std::vector<double> out;
+    for (std::size_t i = 0; i < n; ++i)
+        out.push_back(lo + (hi - lo) * static_cast<double>(i) / static_cast<double>(n - 1));
+    out.back() = hi;
+    return out;
+}
+
+NumberRange parse_range(const std::string& text, std::size_t most, bool may_be_logarithmic) {
+    const auto refuse = [](const std::string& why) { throw std::invalid_argument(why); };
+    const std::vector<std::string> parts = split(text, ':');
+    if (parts.size() < 3 || parts.size() > (may_be_logarithmic ? 4 : 3)) refuse("not a range");
+    const auto lo = number_of(parts[0]), hi = number_of(parts[1]), count = number_of(parts[2]);
+    if (!lo || !hi || !count) refuse("not a number");
+    if (*count != std::floor(*count) || *count < 2) refuse(fmt::format("{} values", parts[2]));
+    if (*count > static_cast<double>(most)) refuse(fmt::format("more than {} values", most));
+    if (!(*hi > *lo)) refuse(fmt::format("the range is empty: {} is not above {}", parts[1], parts[0]));
+    const bool logarithmic = parts.size() == 4;
+    if (logarithmic && parts[3] != "log") refuse(fmt::format("'{}' is not 'log'", parts[3]));
+    if (logarithmic && !(*lo > 0)) refuse("a logarithmic range must begin above 0");
+    return {*lo, *hi, static_cast<std::size_t>(*count), logarithmic};
+}
+
 std::optional<std::size_t> list_index(std::string_view text) {
     const bool digits = std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
     if (text.empty() || text.size() > 6 || !digits) return {};
@@ -130,12 +163,17 @@ std::optional<std::string> near_miss(std::string_view word, const std::vector<st
     for (const std::string& name : names) {
         const auto [shorter, longer] = std::minmax({word.size(), name.size()});
         const std::size_t most = 2 * std::max<std::size_t>(1, longer / 3);
-        if (2 * (longer - shorter) > most) continue;  // the distance is no less
+        if (word.empty() || 2 * (longer - shorter) > most) continue;  // the distance is no less
         const std::size_t distance = edit_distance(word, name);
         if (distance > most) continue;
         if (!nearest || distance < smallest) nearest = name, smallest = distance;
     }
     return nearest;
+}
+
+std::string meant_by(std::string_view word, const std::vector<std::string>& names) {
+    const auto near = near_miss(word, names);
+    return near ? fmt::format("; did you mean '{}'?", *near) : "";
 }
 
 }  // namespace tubule

@@ -153,11 +153,8 @@ std::string wrong_quantity(const std::string& text, QuantityKind kind) {
     if (!parts) return words;
     const auto& [number, unit] = *parts;
     if (unit.starts_with(",")) return words + "; decimals have a point";
-    if (std::ranges::find(names, unit) == names.end()) {
-        const auto near = unit.empty() ? std::nullopt : near_miss(unit, names);
-        return fmt::format("{}; its unit is one of {}{}", words, fmt::join(names, ", "),
-                           near ? fmt::format("; did you mean '{}'?", *near) : "");
-    }
+    if (std::ranges::find(names, unit) == names.end())
+        return fmt::format("{}; its unit is one of {}{}", words, fmt::join(names, ", "), meant_by(unit, names));
     const double value = si(text, kind, celsius);
     if (value >= 1 / largest && value <= largest) return {};
     return value > 0

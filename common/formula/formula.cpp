@@ -8,7 +8,6 @@
 #include <cctype>
 #include <charconv>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 namespace tubule {

@@ -1,6 +1,7 @@
 // All that a result file holds, in memory and as HDF5, the layout of docs/results.md.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -33,6 +34,12 @@ struct Contents : Result {
     std::size_t rows() const { return series.at("time").size(); }
     void add_row(std::span<const double> values) {
         for (std::size_t j = 0; j < values.size(); ++j) series[series_names[j]].push_back(values[j]);
+    }
+    // Its number, that of an equal one if there is one.
+    std::size_t add_mesh(const SurfaceCells& cells) {
+        const auto number = static_cast<std::size_t>(std::ranges::find(meshes, cells) - meshes.begin());
+        if (number == meshes.size()) meshes.push_back(cells);
+        return number;
     }
     void forget() {
         for (auto& [name, column] : series) column.clear();

@@ -64,22 +64,34 @@ struct Opened {
     }
 };
 
+// An attribute to read, and its extent.
+struct Attribute {
+    Handle attribute, extent;
+    Attribute(hid_t object, const std::string& name)
+        : attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, "open attribute", name),
+          extent(H5Aget_space(attribute), H5Sclose, "read attribute", name) {}
+    void read(hid_t type, void* into, const std::string& name) const {
+        require(H5Aread(attribute, type, into) >= 0, "read attribute", name);
+    }
+};
+
 std::vector<const char*> pointers_to(const std::vector<std::string>& texts) {
     std::vector<const char*> out;
     for (const std::string& text : texts) out.push_back(text.c_str());
     return out;
 }
 
-// Texts that read(type, where to) has HDF5 allocate.
-template <class Read>
-std::vector<std::string> texts_of(hid_t extent, const Read& read) {
-    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(extent)));
+// The texts of an attribute or a dataset, which HDF5 allocates.
+template <class From>
+std::vector<std::string> texts_in(hid_t parent, const std::string& name) {
+    const From from(parent, name);
+    std::vector<char*> data(static_cast<std::size_t>(H5Sget_simple_extent_npoints(from.extent)));
     if (data.empty()) return {};
     const auto type = text_type();
-    read(type, data.data());
+    from.read(type, data.data(), name);
     std::vector<std::string> texts;
     for (const char* text : data) texts.emplace_back(text ? text : "");
-    H5Dvlen_reclaim(type, extent, H5P_DEFAULT, data.data());
+    H5Dvlen_reclaim(type, from.extent, H5P_DEFAULT, data.data());
     return texts;
 }
 
@@ -276,21 +288,6 @@ Handle open_group(hid_t parent, const std::string& name) {
     return {H5Gopen2(parent, name.c_str(), H5P_DEFAULT), H5Gclose, "open", name};
 }
 
-namespace {
-
-// An attribute to read, and its extent.
-struct Attribute {
-    Handle attribute, extent;
-    Attribute(hid_t object, const std::string& name)
-        : attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, "open attribute", name),
-          extent(H5Aget_space(attribute), H5Sclose, "read attribute", name) {}
-    void read(hid_t type, void* into, const std::string& name) const {
-        require(H5Aread(attribute, type, into) >= 0, "read attribute", name);
-    }
-};
-
-}  // namespace
-
 void read_number(hid_t object, const std::string& name, hid_t type, void* into) {
     const Attribute opened(object, name);
     require(H5Sget_simple_extent_npoints(opened.extent) == 1, "read as one value attribute", name);
@@ -298,8 +295,7 @@ void read_number(hid_t object, const std::string& name, hid_t type, void* into) 
 }
 
 std::vector<std::string> get_texts(hid_t object, const std::string& name) {
-    const Attribute opened(object, name);
-    return texts_of(opened.extent, [&](hid_t type, void* into) { opened.read(type, into, name); });
+    return texts_in<Attribute>(object, name);
 }
 
 std::string get_text(hid_t object, const std::string& name) {
@@ -349,8 +345,7 @@ std::vector<std::int64_t> get_integers(hid_t parent, const std::string& name) {
 }
 
 std::vector<std::string> get_text_array(hid_t parent, const std::string& name) {
-    const Opened opened(parent, name);
-    return texts_of(opened.extent, [&](hid_t type, void* into) { opened.read(type, into, name); });
+    return texts_in<Opened>(parent, name);
 }
 
 std::string get_text_dataset(hid_t parent, const std::string& name) {

@@ -67,8 +67,8 @@ void check_free(const std::string& name, std::span<const char* const> taken, con
 void check_mesh(const SurfaceCells& mesh) {
     const auto refuse = [](const std::string& why) { throw std::invalid_argument("mesh: " + why); };
     if (mesh.order < 1 || mesh.order > 4) refuse(fmt::format("its order is {}, not 1 to 4", mesh.order));
-    const int width = (mesh.order + 1) * (mesh.order + 2) / 2;
-    if (mesh.cells.empty() || mesh.cells.size() % static_cast<std::size_t>(width) != 0)
+    const std::size_t width = mesh.nodes_per_cell();
+    if (mesh.cells.empty() || mesh.cells.size() % width != 0)
         refuse(fmt::format("{} node numbers do not divide into cells of {}", mesh.cells.size(), width));
     for (const int node : mesh.cells)
         if (node < 0 || static_cast<std::size_t>(node) >= mesh.nodes)
@@ -294,13 +294,8 @@ void ResultWriter::row(std::span<const double> values) {
 std::size_t ResultWriter::mesh(const SurfaceCells& cells) {
     check_mesh(cells);
     impl_->refuse_if_finished();
-    std::vector<SurfaceCells>& meshes = impl_->contents.meshes;
-    const auto same = std::find(meshes.begin(), meshes.end(), cells);
-    const auto number = static_cast<std::size_t>(same - meshes.begin());
-    if (same == meshes.end()) {
-        meshes.push_back(cells);
-        impl_->added(false, false);
-    }
+    const std::size_t before = impl_->contents.meshes.size(), number = impl_->contents.add_mesh(cells);
+    if (number == before) impl_->added(false, false);
     return number;
 }
 

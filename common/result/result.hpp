@@ -29,13 +29,15 @@ struct Array {
 struct SurfaceCells {
     int order = 3;           // k, 1 to 4
     std::size_t nodes = 0;   // how many
-    std::vector<int> cells;  // node numbers, (k+1)(k+2)/2 for each cell
+    std::vector<int> cells;  // node numbers, nodes_per_cell() for each
 
     // Tubes: the length of a period in z, and for every entry of `cells` the number of periods by which the node is
     // moved as this cell sees it. 0 and empty on a closed surface.
     double period = 0;
     std::vector<int> shifts;
 
+    std::size_t nodes_per_cell() const { return static_cast<std::size_t>((order + 1) * (order + 2) / 2); }
+    std::size_t count() const { return cells.size() / nodes_per_cell(); }  // of cells
     bool operator==(const SurfaceCells&) const = default;
 };
 

@@ -18,15 +18,6 @@ namespace {
 
 constexpr std::uint8_t lagrange_triangle = 69;  // VTK_LAGRANGE_TRIANGLE
 
-std::size_t nodes_per_cell(const SurfaceCells& mesh) {
-    const auto k = static_cast<std::size_t>(mesh.order);
-    return (k + 1) * (k + 2) / 2;
-}
-
-std::size_t cell_count(const SurfaceCells& mesh) {
-    return mesh.cells.size() / nodes_per_cell(mesh);
-}
-
 // The header of every VTKHDF group. VTK requires a string of fixed length.
 void put_format(hid_t group, std::array<std::int64_t, 2> version) {
     put_attribute(group, "Version", H5T_NATIVE_INT64, space({2}), version.data());
@@ -97,7 +88,7 @@ std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>&
             written.push_back({mesh, std::move(points), ""});
             continue;
         }
-        const std::size_t cells = cell_count(mesh);
+        const std::size_t cells = mesh.count();
         const auto group = make_group(parent, name);
         put_attribute(group, "order", std::int64_t{mesh.order});
         put_attribute(group, "nodes", static_cast<std::int64_t>(mesh.nodes));
@@ -107,7 +98,8 @@ std::vector<WrittenMesh> put_meshes(hid_t file, const std::vector<SurfaceCells>&
         put_dataset(group, "NumberOfConnectivityIds", std::vector{static_cast<std::int64_t>(mesh.cells.size())});
         put_dataset(group, "Connectivity", points.connectivity);
         std::vector<std::int64_t> offsets;
-        for (std::size_t c = 0; c <= cells; ++c) offsets.push_back(static_cast<std::int64_t>(c * nodes_per_cell(mesh)));
+        for (std::size_t c = 0; c <= cells; ++c)
+            offsets.push_back(static_cast<std::int64_t>(c * mesh.nodes_per_cell()));
         put_dataset(group, "Offsets", offsets);
         put_dataset(group, "Types", std::vector<std::uint8_t>(cells, lagrange_triangle));
         if (mesh.period > 0) {
@@ -250,7 +242,7 @@ void put_numbers(hid_t group, const std::vector<WrittenMesh>& meshes) {
     std::vector<std::int64_t> points, cells, ids;
     std::vector<Part> connectivity, offsets, types;
     for (const WrittenMesh& written : meshes) {
-        const std::size_t count = cell_count(written.mesh);
+        const std::size_t count = written.mesh.count();
         points.push_back(static_cast<std::int64_t>(written.points.node.size()));
         cells.push_back(static_cast<std::int64_t>(count));
         ids.push_back(static_cast<std::int64_t>(written.mesh.cells.size()));
@@ -297,7 +289,7 @@ void put_steps(hid_t file, const Contents& contents, const std::vector<WrittenMe
     for (const Step& step : steps) {
         std::int64_t cell = 0, id = 0;
         for (std::size_t m = 0; m < *step.record.mesh; ++m) {
-            cell += static_cast<std::int64_t>(cell_count(meshes[m].mesh));
+            cell += static_cast<std::int64_t>(meshes[m].mesh.count());
             id += static_cast<std::int64_t>(meshes[m].mesh.cells.size());
         }
         times.push_back(step.record.time);

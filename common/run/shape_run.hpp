@@ -91,17 +91,14 @@ template <class Tier, class Write>
 StopReport find_shapes(Tier& tier, const Write& write, std::vector<std::string>& warnings) {
     using Shape = typename Tier::Shape;
     const auto& task = tier.task();
-    const auto report = [&](const auto& ended, const char* well) {
-        const bool finished = ended.stop == Stop::finished;
-        return StopReport{ended.stop, 0, finished ? well : ended.message, tier.advice(ended.stop)};
-    };
     BranchPoint<Shape> first;
     first.shape = tier.find();
-    if (first.shape.stop != Stop::finished || !task.set) {
+    const Stop stop = first.shape.stop;
+    if (stop != Stop::finished || !task.set) {
         first.parameter = task.branch.from;
-        first.index = first.shape.stop == Stop::finished ? tier.negative_directions(first.shape) : -1;
+        first.index = stop == Stop::finished ? tier.negative_directions(first.shape) : -1;
         write(first);
-        return report(first.shape, "the shape is stationary");
+        return {stop, 0, stop == Stop::finished ? "the shape is stationary" : first.shape.message, tier.advice(stop)};
     }
     auto settings = task.branch;
     settings.found = [&](const BranchPoint<Shape>& point) {
@@ -111,7 +108,7 @@ StopReport find_shapes(Tier& tier, const Write& write, std::vector<std::string>&
     Branch<Shape> branch = follow_branches(task.problem, first.shape, task.set, settings,
                                            [](const auto&... of) { return follow_branch(of...); });
     warnings = std::move(branch.warnings);
-    return report(branch, "the branch left its parameter interval");
+    return {branch.stop, 0, branch.message, tier.advice(branch.stop)};
 }
 
 // Hands over the shape, or those of the branch, as they are found, and sums up. `Tier` offers

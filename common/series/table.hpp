@@ -1,9 +1,13 @@
 // The series of one kind of run: names and values of its rows from one table.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <initializer_list>
+#include <limits>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -58,6 +62,12 @@ void add_energies(SeriesTable<Row>& table, const Bending& energy, const Of& /*of
         if (energy.alpha)
             table.add({{"energy_alpha", [](const Row& r) -> double { return Of{}(r).energy_alpha; }},
                        {"M", [](const Row& r) -> double { return Of{}(r).M; }}});
+}
+
+// What a row has for one of its series; NaN if it has no such series, or there is no row.
+inline double value_in(std::span<const double> row, const std::vector<std::string>& series, std::string_view name) {
+    const auto at = static_cast<std::size_t>(std::ranges::find(series, name) - series.begin());
+    return at < row.size() ? row[at] : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace tubule

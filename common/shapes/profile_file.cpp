@@ -7,7 +7,6 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <numeric>
 #include <sstream>
 
 #include "common/geometry/profile_point.hpp"

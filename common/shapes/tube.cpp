@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <complex>
 #include <map>
+#include <numeric>
 
 namespace tubule {
 
@@ -30,6 +31,13 @@ double minimise(const Tube& tube, double low, double high) {
 }
 
 }  // namespace
+
+int common_waves(const Tube& tube) {
+    int waves = 0;
+    for (const TubeMode& mode : tube.modes)
+        if (mode.amplitude != 0) waves = mode.m == 0 ? std::gcd(waves, mode.n) : 1;
+    return waves;
+}
 
 Neck narrowest(const Tube& tube) {
     int waves = 0;

@@ -84,6 +84,9 @@ inline Curve meridian(const Tube& tube) {
     });
 }
 
+// How often waves along the axis alone repeat within the length; 0 without waves, 1 with other ones.
+int common_waves(const Tube& tube);
+
 // The smallest r0 over the meridian theta = 0 and where it is, 0 <= z < length.
 struct Neck {
     double z = 0, radius = 0;

@@ -2,8 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <memory>
-
 #include "common/solve/sparse_cholmod.hpp"
 
 namespace tubule {

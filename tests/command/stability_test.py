@@ -486,7 +486,7 @@ equilibrium = {modes = 2, area = 41.074}
                 model = () if option == "--tension" else ("--model", "stokes")
                 self.refuses(f"{option} must be from", self.tube, option, number, *model)
         self.refuses("--tension must be from -1e+100 to 1e+100, not -1e+308", self.tube, "--tension", "-1e308")
-        self.refuses('not "stokse"; did you mean "stokes"?', self.tube, "--model", "stokse")
+        self.refuses("not 'stokse'; did you mean 'stokes'?", self.tube, "--model", "stokse")
         self.refuses("--modes must be from 0 to 100, not -1", self.tube, "--modes", "-1")
         self.refuses("--rates must be from 1 to 100, not 0", self.tube, "--numerical", "--rates", "0")
         self.refuses("--waves must be from 1 to 10000, not 10001", self.tube, "--waves", "10001")

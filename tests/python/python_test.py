@@ -548,7 +548,7 @@ class Answers(Folder):
                                ({"modes": 10**9}, "modes must be from 0 to 100"), ({"modes": -1}, "modes must be from 0"),
                                ({"waves": 10**8}, "waves must be from 1 to 10000"), ({"waves": -5}, "waves must be from 1"),
                                ({"Re": -1.0}, "Re must be from 1e-100"), ({"gamma": -1.0}, "gamma must be from 0"),
-                               ({"tension": float("nan")}, "tension must be from"), ({"model": "stokse"}, 'did you mean "stokes"'),
+                               ({"tension": float("nan")}, "tension must be from"), ({"model": "stokse"}, "did you mean 'stokes'"),
                                ({"q": []}, "q must not be empty"), ({"q": [float("nan")]}, "is not a number")):  # fmt: skip
             with self.assertRaisesRegex(ValueError, "^(?!--).*" + words):
                 tubule.stability(case, **options)

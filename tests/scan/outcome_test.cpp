@@ -10,7 +10,7 @@
 #include "common/case/read.hpp"
 #include "common/solve/interrupt.hpp"
 #include "tools/scan/point.hpp"
-#include "tools/scan/uniform_fate.hpp"
+#include "tools/scan/uniform_end.hpp"
 
 namespace tubule::outcome_test {
 
@@ -85,17 +85,17 @@ TEST(Outcome, InterruptedPointsSaySo) {
 }
 
 // Where it does not apply it must not be used: other models, a volume that is kept, closed cells.
-TEST(UniformFate, AppliesToTubesInGradientFlow) {
+TEST(UniformEnd, AppliesToTubesInGradientFlow) {
     Case c = tube(0, -2, 2, 0.2);
-    EXPECT_TRUE(UniformFate::of(c));
+    EXPECT_TRUE(UniformEnd::of(c));
     c.model.keeps_volume = true;
-    EXPECT_FALSE(UniformFate::of(c));
+    EXPECT_FALSE(UniformEnd::of(c));
     c = tube(0, -2, 2, 0.2);
     c.model.kind = ModelKind::stokes;
-    EXPECT_FALSE(UniformFate::of(c));
+    EXPECT_FALSE(UniformEnd::of(c));
     c = tube(0, -2, 2, 0.2);
     c.shape = Sphere{};
-    EXPECT_FALSE(UniformFate::of(c));
+    EXPECT_FALSE(UniformEnd::of(c));
 }
 
 // A straight tube with waves of relative amplitude `wave` in the radii only.
@@ -107,9 +107,9 @@ TubeState nearly_straight(const Case& c, double R, double wave) {
 
 // Maths 5. H0 = 0: waves shorter than the circumference decay, so do longer ones; k42 < 0 at R = 1/|H0|: the wave
 // q R = 1 grows at the rate -2 k42 q^4/R^2. The radius drifts from 1 to 1/|H0|, where it may become unstable.
-TEST(UniformFate, FollowsTheDispersionRelation) {
+TEST(UniformEnd, FollowsTheDispersionRelation) {
     const auto decided = [](const Case& c, double R, double wave) {
-        return UniformFate::of(c)->decided(nearly_straight(c, R, wave));
+        return UniformEnd::of(c)->decided(nearly_straight(c, R, wave));
     };
     EXPECT_TRUE(decided(tube(0, 0, 2, 0.1), 1, 0.001));
     EXPECT_FALSE(decided(tube(0, 0, 2, 0.1), 1, 0.02)) << "too large a wave";
@@ -118,9 +118,9 @@ TEST(UniformFate, FollowsTheDispersionRelation) {
     EXPECT_FALSE(decided(tube(-0.05, -2, std::numbers::pi, 0.1), 1, 0.001)) << "stable now, but not where it goes";
     Case c = tube(0, -2, 2, 0.1);
     TubeState s = nearly_straight(c, 1, 0.001);
-    EXPECT_TRUE(UniformFate::of(c)->decided(s));
+    EXPECT_TRUE(UniformEnd::of(c)->decided(s));
     s.energy *= 1.1;
-    EXPECT_FALSE(UniformFate::of(c)->decided(s)) << "waves that are low, but steep";
+    EXPECT_FALSE(UniformEnd::of(c)->decided(s)) << "waves that are low, but steep";
 }
 
 // Wherever the outcome is decided early, a run to the end gives the same; no outcome is lost.
@@ -145,11 +145,11 @@ void compare_random_points(int count, unsigned seed) {
     EXPECT_GT(decided, count / 3);
 }
 
-TEST(UniformFate, IsNeverWrong) {
+TEST(UniformEnd, IsNeverWrong) {
     compare_random_points(30, 1);
 }
 
-TEST(UniformFateStudy, IsNeverWrongManyTimes) {
+TEST(UniformEndStudy, IsNeverWrongManyTimes) {
     compare_random_points(2000, 2);
 }
 

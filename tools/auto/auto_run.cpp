@@ -15,6 +15,7 @@
 #include "common/case/problem.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/run/run_observer.hpp"
+#include "common/series/table.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "surface3d/run/motion_start.hpp"
@@ -225,8 +226,8 @@ std::string doubts(const Problem& c, const RatesKnown& known, const NoiseGrowth&
 
 // That loads have done by the last row; 0 where none changes.
 double work_of(const Before& before, const std::vector<std::string>& names) {
-    const auto work = std::find(names.begin(), names.end(), "work");
-    return work == names.end() ? 0 : before.rows.back()[work - names.begin()];
+    const double work = value_in(before.rows.back(), names, "work");
+    return std::isnan(work) ? 0 : work;
 }
 
 void add_doubts(RunSummary& s, const Problem& c, const RatesKnown& known, const NoiseGrowth& growth) {

@@ -90,11 +90,11 @@ std::size_t frame_number(const std::string& text, const Result& result, const st
     const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || rest != text.data() + text.size())
         refuse(fmt::format("--frames {}: must be I:J, a frame of A and one of B, such as 3:0 or -1:-1", option));
-    const auto index = frame_index(result, number);
-    if (!index)
-        refuse(fmt::format("--frames {}: no frame {}: there are {} frames, counted from 0, or from -1 backwards",
-                           option, number, result.frames.size()));
-    return *index;
+    try {
+        return frame_named(result, number);
+    } catch (const std::runtime_error& error) {
+        refuse(fmt::format("--frames {}: {}", option, error.what()));
+    }
 }
 
 std::string frame_times(const Result& result) {
@@ -159,9 +159,8 @@ void require_known(const std::vector<Quantity>& tolerances, const std::vector<Qu
     for (const Quantity& quantity : known) names.push_back(quantity.name);
     for (const auto& [name, most] : tolerances) {
         if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-        const auto meant = near_miss(name, names);
-        refuse(fmt::format("--tolerance {}: not compared here{}; it must be one of {}", name,
-                           meant ? fmt::format("; did you mean '{}'", *meant) : "", fmt::join(names, ", ")));
+        refuse(fmt::format("--tolerance {}: not compared here; it must be one of {}{}", name, fmt::join(names, ", "),
+                           meant_by(name, names)));
     }
 }
 

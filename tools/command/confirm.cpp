@@ -239,7 +239,7 @@ std::vector<ConfirmedPoint> plan(const ConfirmOptions& options, const ScanResult
     const auto around = result.scan.boundary ? result.scan.boundary->around : std::nullopt;
     const auto common = static_cast<std::ptrdiff_t>(result.scan.sets.size());  // settings of all points
     std::vector<ConfirmedPoint> all;
-    for (const confirm::Pick& pick : confirm::pick_points(result.shape(), result.outcomes(), around,
+    for (const confirm::Pick& pick : confirm::pick_points(result.scan.shape(), result.outcomes(), around,
                                                           static_cast<std::size_t>(options.points), options.seed)) {
         const auto sets = result.scan.sets_of(pick.point);
         ConfirmedPoint p;
@@ -248,7 +248,7 @@ std::vector<ConfirmedPoint> plan(const ConfirmOptions& options, const ScanResult
         p.c = result.scan.case_of(pick.point);
         p.c.title = fmt::format("{}, perturbed", fmt::join(p.sets, ", "));
         p.axisymmetric = result.points[pick.point];
-        if (!p.c.is_axisymmetric())
+        if (!p.c.runs_in_tier_axisym())
             throw CaseError(options.scan + ": is a scan of tier \"surface3d\" already: there is nothing to confirm");
         if (p.c.is_equilibrium() && options.choices.end)
             throw CaseError("--end is for scans of motions: " + options.scan + " is one of equilibria");

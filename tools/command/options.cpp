@@ -1,7 +1,5 @@
 #include "tools/command/options.hpp"
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <map>
 #include <system_error>

@@ -18,6 +18,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/case/read.hpp"
 #include "common/result/result.hpp"
 
 namespace tubule {
@@ -52,6 +53,16 @@ inline std::string explanation(const std::exception& error) {
         return fmt::format("{}: {}", file->path1().string(), file->code().message());
     if (dynamic_cast<const std::bad_alloc*>(&error)) return "out of memory";
     return error.what();
+}
+
+// What `f` returns; what it throws, as bad input: a file that cannot be read or written is.
+template <class F>
+auto as_bad_input(const F& f) {
+    try {
+        return f();
+    } catch (const std::runtime_error& error) {
+        throw CaseError(explanation(error));
+    }
 }
 
 // What is wrong with a number of the command line: nothing, unless it is infinite or none.

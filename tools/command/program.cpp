@@ -106,7 +106,7 @@ std::string meant_by(const std::string& word, const CLI::App& command) {
             for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
     else
         for (const CLI::App* one : command.get_subcommands({})) names.push_back(one->get_name());
-    if (const auto near = near_miss(word, names)) return fmt::format("; did you mean '{}'?", *near);
+    if (std::string near = tubule::meant_by(word, names); !near.empty()) return near;
     if (word.starts_with("\u2013") || word.starts_with("\u2014"))
         return "; an option begins with the hyphen of the keyboard, -";
     if (word.starts_with("-") && !command.get_subcommands({}).empty())

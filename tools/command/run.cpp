@@ -184,7 +184,7 @@ void report(const ChosenCase& chosen, const RunSummary& s, const std::string& fi
 }
 
 bool derivatives_can_be_checked(const Problem& c) {
-    return c.is_axisymmetric() && is_tube(c.shape);
+    return c.runs_in_tier_axisym() && is_tube(c.shape);
 }
 
 // Prints the Taylor slopes of every term at the start; whether all are as they should be.
@@ -232,12 +232,10 @@ std::optional<Opened> resume(const ChosenCase& chosen, const Engine& engine, con
 // A result that cannot be written or resumed is found before anything is computed: bad input.
 std::optional<Opened> open_result(const ChosenCase& c, const Engine& engine, const std::filesystem::path& file,
                                   bool resuming) {
-    try {
+    return as_bad_input([&]() -> std::optional<Opened> {
         if (resuming && std::filesystem::exists(file)) return resume(c, engine, file);
         return create(c, engine, file);
-    } catch (const std::runtime_error& error) {
-        throw CaseError(explanation(error));
-    }
+    });
 }
 
 // A frame at a time that lies behind cannot be written any more.
@@ -373,13 +371,7 @@ Job job_of_result(const std::string& path, const std::vector<std::string>& sets,
         throw CaseError(fmt::format("{}: is a result: --resume goes on with it; to run it anew, give its case", path));
     if (!options.output.empty())
         throw CaseError(fmt::format("-o must be absent: {} itself goes on; copy it to keep it as it is", path));
-    try {
-        return {{case_of_result(read_result(path), path, sets), ""}, path, {}};
-    } catch (const CaseError&) {
-        throw;
-    } catch (const std::runtime_error& error) {
-        throw CaseError(explanation(error));
-    }
+    return as_bad_input([&] { return Job{{case_of_result(read_result(path), path, sets), ""}, path, {}}; });
 }
 
 Job job_of(const std::string& path, const RunOptions& options) {

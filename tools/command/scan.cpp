@@ -45,12 +45,10 @@ std::filesystem::path scan_path(const ScanOptions& options, const Scan& scan) {
 
 // A result that cannot be written or resumed is found before anything is computed: bad input.
 ScanWriter open_result(const Scan& scan, const std::filesystem::path& file, bool resuming) {
-    try {
+    return as_bad_input([&] {
         if (resuming && std::filesystem::exists(file)) return ScanWriter::resume(file, scan);
         return ScanWriter::create(file, scan, about_start());
-    } catch (const std::runtime_error& error) {
-        throw CaseError(explanation(error));
-    }
+    });
 }
 
 // A scan by its result has its case and all choices in it: only values can be added.
@@ -83,15 +81,13 @@ void refuse_other_choices(const ScanOptions& options) {
 
 ScanWriter grown_result(const ScanOptions& options) {
     refuse_other_choices(options);
-    try {
+    return as_bad_input([&] {
         ScanResult result = read_scan_result(options.choices.file);
         if (options.resume) return ScanWriter::resume(options.choices.file, result.scan);
         if (options.extend) result = extended(result, options.choices.over);
         for (const std::string& other : options.merge) result = merged(result, read_scan_result(other));
         return ScanWriter::create(scan_path(options, result.scan), result.scan, about_start(), result.points);
-    } catch (const std::runtime_error& error) {
-        throw CaseError(explanation(error));
-    }
+    });
 }
 
 ScanWriter new_result(const ScanOptions& options) {

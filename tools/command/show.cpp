@@ -111,16 +111,11 @@ void add_frames(Text& out, const std::vector<Record>& frames, const Shown& in) {
     }
 }
 
-std::size_t cell_count(const SurfaceCells& mesh) {
-    const auto k = static_cast<std::size_t>(mesh.order);
-    return mesh.cells.size() / ((k + 1) * (k + 2) / 2);
-}
-
 void add_meshes(Text& out, const std::vector<SurfaceCells>& meshes, const LabUnit& length) {
     if (meshes.empty()) return;
     add(out, "\n{:>6} {:>9} {:>9} {:>6}  periodic\n", "mesh", "triangles", "nodes", "order");
     for (std::size_t i = 0; i < meshes.size(); ++i)
-        add(out, "{:>6} {:>9} {:>9} {:>6}  {}\n", i, cell_count(meshes[i]), meshes[i].nodes, meshes[i].order,
+        add(out, "{:>6} {:>9} {:>9} {:>6}  {}\n", i, meshes[i].count(), meshes[i].nodes, meshes[i].order,
             meshes[i].period > 0 ? "in z, " + with_unit(meshes[i].period, length, 8) : "no: closed");
 }
 
@@ -235,7 +230,7 @@ Json json_of(const Record& record, bool data) {
 
 // Cells by their number alone, unless `data` too is wanted.
 Json json_of(const SurfaceCells& mesh, bool data) {
-    Json out{{"order", mesh.order}, {"nodes", mesh.nodes}, {"triangles", cell_count(mesh)}, {"period", mesh.period}};
+    Json out{{"order", mesh.order}, {"nodes", mesh.nodes}, {"triangles", mesh.count()}, {"period", mesh.period}};
     if (data) out["cells"] = mesh.cells, out["shifts"] = mesh.shifts;
     return out;
 }
@@ -259,13 +254,6 @@ std::string json_text(const Result& result, std::optional<std::size_t> with_data
 
 // ----
 
-std::size_t known_frame(const Result& result, long asked) {
-    if (const auto index = frame_index(result, asked)) return *index;
-    const std::size_t count = result.frames.size();
-    throw std::runtime_error(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
-                                       : fmt::format("no frame {}: there are none", asked));
-}
-
 Text shown_scan(const ShowOptions& options) {
     if (options.frame) throw std::runtime_error("a scan has no frames: --frame must be absent");
     Text out;
@@ -283,7 +271,7 @@ Text shown(const ShowOptions& options) {
     if (is_scan(options.file)) return shown_scan(options);
     const Result result = read_result(options.file);
     std::optional<std::size_t> frame;
-    if (options.frame) frame = known_frame(result, *options.frame);
+    if (options.frame) frame = frame_named(result, *options.frame);
     Text out;
     if (options.json)
         add(out, "{}", json_text(result, frame));

@@ -24,7 +24,6 @@
 #include "common/solve/message.hpp"
 #include "common/solve/pause.hpp"
 #include "common/solve/sparse.hpp"
-#include "common/theory/waves.hpp"
 #include "tools/command/commands.hpp"
 #include "tools/command/options.hpp"
 #include "tools/command/output.hpp"
@@ -78,14 +77,6 @@ struct NoPicture {
 
 bool is_result(const std::string& file) {
     return std::filesystem::path(file).extension() == ".hdf";
-}
-
-Record frame_of(const StabilityOptions& options, const Result& result) {
-    const std::size_t count = result.frames.size();
-    const long asked = options.frame.value_or(-1);
-    if (const auto index = frame_index(result, asked)) return result.frames[*index];
-    throw std::invalid_argument(count > 0 ? fmt::format("no frame {}: there are 0 to {}", asked, count - 1)
-                                          : "has no frames yet");
 }
 
 StabilitySubject subject_of(const StabilityOptions& options) {
@@ -257,9 +248,8 @@ void refuse_values(const StabilityOptions& o) {
     if (o.kT) require_within("--kT", *o.kT, 0, largest_number);
     const std::vector<std::string> names = model_names();
     if (o.model.empty() || std::find(names.begin(), names.end(), o.model) != names.end()) return;
-    const auto meant = near_miss(o.model, names);
-    throw std::invalid_argument(fmt::format("--model must be one of {}, not \"{}\"{}", fmt::join(names, ", "), o.model,
-                                            meant ? fmt::format("; did you mean \"{}\"?", *meant) : ""));
+    throw std::invalid_argument(fmt::format("--model must be one of {}, not '{}'{}", fmt::join(names, ", "), o.model,
+                                            meant_by(o.model, names)));
 }
 
 void refuse_contradictions(const StabilityOptions& o, bool of_result) {
@@ -308,7 +298,11 @@ StabilitySubject stability_subject(Result result, const StabilityOptions& option
         if (options.fit.empty()) throw;
         subject.case_is_known = false;
     }
-    if (options.fit.empty()) subject.frame = frame_of(options, *subject.result);
+    if (options.fit.empty()) try {
+            subject.frame = subject.result->frames[frame_named(*subject.result, options.frame.value_or(-1))];
+        } catch (const std::runtime_error& error) {
+            throw std::invalid_argument(error.what());
+        }
     return subject;
 }
 

@@ -61,18 +61,14 @@ std::vector<double> wave_numbers(const std::string& text) {
     if (std::count(text.begin(), text.end(), ',') >= most)
         throw std::invalid_argument(fmt::format("--q: more than {} wave numbers", most));
     std::vector<double> q;
-    if (text.find(':') != std::string::npos) {
-        const auto parts = split(text, ':');
-        if (parts.size() != 3)
-            throw std::invalid_argument("--q must be a list q1,q2,... or from:to:count, not " + text);
-        const double from = number(parts[0]), to = number(parts[1]), count = number(parts[2]);
-        if (!(to > from) || count != std::floor(count) || count < 2 || count > most)
-            throw std::invalid_argument(
-                fmt::format("--q from:to:count needs to > from and 2 to {} wave numbers, not {}", most, text));
-        for (int i = 0; i < count; ++i) q.push_back(from + (to - from) * i / (count - 1));
-    } else {
+    if (text.find(':') != std::string::npos) try {
+            q = parse_range(text, most).evenly();
+        } catch (const std::invalid_argument& error) {
+            throw std::invalid_argument(fmt::format(
+                "--q {}: {}; give from:to:count, 2 to {} wave numbers, or a list q1,q2,...", text, error.what(), most));
+        }
+    else
         for (const std::string& part : split(text, ',')) q.push_back(number(part));
-    }
     for (const double value : q)
         if (!(value >= 0 && value <= largest_number))
             throw std::invalid_argument(

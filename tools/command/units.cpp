@@ -4,11 +4,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/case/read.hpp"
@@ -65,17 +62,11 @@ struct UnitsOptions {
 
 Case case_of(const UnitsOptions& o) {
     if (!is_hdf5(o.file)) return read_case(o.file, o.sets);
-    CaseText text;
-    try {
-        if (is_scan(o.file)) {
-            const Scan scan = read_scan_result(o.file).scan;
-            text = {scan.case_text, scan.sets, scan.inputs};
-        } else {
-            text = read_case_text(o.file);
-        }
-    } catch (const std::runtime_error& error) {
-        throw CaseError(explanation(error));
-    }
+    CaseText text = as_bad_input([&]() -> CaseText {
+        if (!is_scan(o.file)) return read_case_text(o.file);
+        const Scan scan = read_scan_result(o.file).scan;
+        return {scan.case_text, scan.sets, scan.inputs};
+    });
     text.sets.insert(text.sets.end(), o.sets.begin(), o.sets.end());
     return parse_case(text.text, text.sets, o.file, text.inputs);
 }

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
 #include "common/case/read.hpp"
+#include "common/result/hdf5_file.hpp"
 #include "common/result/start_frame.hpp"
 #include "common/run/run_clock.hpp"
 #include "common/solve/pause.hpp"
@@ -18,19 +18,16 @@ namespace {
 
 class Memory : public RunObserver {
 public:
-    Memory(Result& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
+    Memory(Contents& result, const MemoryRunOptions& options, std::optional<ResultWriter>& writer)
         : result_(result), options_(options), writer_(writer) {}
 
     void row(std::span<const double> values) override {
-        for (std::size_t i = 0; i < values.size(); ++i) result_.series.at(result_.series_names[i]).push_back(values[i]);
+        result_.add_row(values);
         if (writer_) writer_->row(values);
     }
     std::size_t mesh(const SurfaceCells& cells) override {
-        const auto same = std::find(result_.meshes.begin(), result_.meshes.end(), cells);
-        const std::size_t number = static_cast<std::size_t>(same - result_.meshes.begin());
-        if (same == result_.meshes.end()) result_.meshes.push_back(cells);
         if (writer_) writer_->mesh(cells);  // numbers them alike
-        return number;
+        return result_.add_mesh(cells);
     }
     void frame(const std::function<Record()>& make) override {
         result_.frames.push_back(make());
@@ -41,8 +38,7 @@ public:
         if (writer_) writer_->checkpoint(state);
     }
     void discard() override {
-        for (auto& [name, values] : result_.series) values.clear();
-        result_.frames.clear(), result_.meshes.clear(), result_.checkpoint.reset();
+        result_.forget();
         if (writer_) writer_->discard();
     }
     void progress(double time, double energy, double step) override {
@@ -57,7 +53,7 @@ public:
     }
 
 private:
-    Result& result_;
+    Contents& result_;
     const MemoryRunOptions& options_;
     std::optional<ResultWriter>& writer_;
     std::chrono::steady_clock::time_point next_ = std::chrono::steady_clock::now();
@@ -74,7 +70,7 @@ Result run_in_memory(const Problem& given, const MemoryRunOptions& options) {
     if (!chosen.c.input) chosen.c.input = current_input(chosen.c);
     const Problem& c = chosen.c;
     const Engine engine(c);
-    Result result;
+    Contents result;
     result.case_text = kept_case(c);
     result.about = about_start();
     add_choice(result.about, chosen);

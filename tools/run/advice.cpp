@@ -187,7 +187,7 @@ Problem pilot_of(const Problem& c, ModelKind kind, bool axisymmetric) {
     out.discretisation = {}, out.surface = {};
     if (axisymmetric) {
         out.accuracy.energy = std::min(c.accuracy.energy, accuracy);
-        if (!c.is_axisymmetric()) out.tier = Tier::automatic;
+        if (!c.runs_in_tier_axisym()) out.tier = Tier::automatic;
         return out;
     }
     out.tier = Tier::surface3d;
@@ -227,7 +227,7 @@ std::string untold(const Problem& c, const Choice& choice) {
     if (c.velocity.initial != InitialVelocity::rest) return "the case gives a velocity";
     if (law.reservoir || law.free_period || !law.without_loads())
         return "a tension, pressure or force, a reservoir or a free period acts on the membrane";
-    if (c.energy.H0_varies() && !c.is_axisymmetric()) return "energy.H0 varies";
+    if (c.energy.H0_varies() && !c.runs_in_tier_axisym()) return "energy.H0 varies";
     if (!choice.axisymmetric && !choice.start->resizable()) return "the initial shape brings its own triangles";
     return {};
 }
@@ -237,7 +237,7 @@ std::string untold(const Problem& c, const Choice& choice) {
 // brings its own triangles, or a trial run does not come to its end. Where nothing moves the simplest is the only one.
 SimplerModels simpler_models(const Problem& c) {
     if (c.law.viscosity == 0) return {{}, "no model is simpler"};
-    const Choice choice = c.is_axisymmetric() ? Choice{} : choice_for(c);
+    const Choice choice = c.runs_in_tier_axisym() ? Choice{} : choice_for(c);
     if (std::string why = untold(c, choice); !why.empty()) return {{}, std::move(why)};
     SimplerModels out;
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes}) {
@@ -248,7 +248,7 @@ SimplerModels simpler_models(const Problem& c) {
         if (one && one->rests) return out;
     }
     if (out.models.empty())
-        out.unknown = choice.axisymmetric && !c.is_axisymmetric()
+        out.unknown = choice.axisymmetric && !c.runs_in_tier_axisym()
                           ? "trial runs of simpler models do not come to the end as axisymmetric ones"
                           : "trial runs of simpler models do not come to the end";
     return out;

@@ -35,7 +35,7 @@ std::array<double, 2> across(const Problem& c, const surface3d::CurvatureField& 
                              int i) {
     const double mean = exact.H[i] / 2, apart = std::sqrt(std::max(mean * mean - exact.K[i], 0.0));
     const double r = std::hypot(x.x(), x.y());
-    if (!c.is_axisymmetric() || apart < 1e-8 * std::abs(mean)) return {mean - apart, mean + apart};
+    if (!c.runs_in_tier_axisym() || apart < 1e-8 * std::abs(mean)) return {mean - apart, mean + apart};
     const double around = -(exact.normal(0, i) * x.x() + exact.normal(1, i) * x.y()) / (r * r);
     return {around, around};
 }

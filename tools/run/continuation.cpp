@@ -43,10 +43,6 @@ bool may_change(const Difference& d) {
     return d.key == "time.end" || d.key == "time.output" || d.key == "time.stationary";
 }
 
-std::string key_of(const std::string& set) {
-    return set.substr(0, set.find('='));
-}
-
 std::string unreadable(const CaseError& error) {
     return fmt::format("its case cannot be read by this version: {}", error.what());
 }
@@ -126,9 +122,11 @@ std::optional<ModelKind> chosen_before(const std::filesystem::path& file) {
     return out;
 }
 
-std::optional<std::size_t> frame_index(const Result& result, long number) {
+std::size_t frame_named(const Result& result, long number) {
     const long count = static_cast<long>(result.frames.size()), index = number < 0 ? count + number : number;
-    return index >= 0 && index < count ? std::optional(static_cast<std::size_t>(index)) : std::nullopt;
+    if (index >= 0 && index < count) return static_cast<std::size_t>(index);
+    throw std::runtime_error(
+        fmt::format("no frame {}: there are {}", number, count > 0 ? fmt::format("0 to {}", count - 1) : "none"));
 }
 
 std::optional<Stop> stop_of(const Result& result) {

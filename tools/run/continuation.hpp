@@ -39,8 +39,8 @@ CaseInputs inputs_to_resume(const std::filesystem::path& file);
 // The model that stands for model.kind = "auto" in the case of a result, if it has one.
 std::optional<ModelKind> chosen_before(const std::filesystem::path& file);
 
-// Which frame a number names: negative ones count from the last. None if there is no such frame.
-std::optional<std::size_t> frame_index(const Result& result, long number);
+// Which frame a number names: negative ones count from the last. Throws std::runtime_error if there is no such frame.
+std::size_t frame_named(const Result& result, long number);
 
 // How a result came to the state in which it is; nothing if it is unfinished.
 std::optional<Stop> stop_of(const Result& result);

@@ -19,7 +19,7 @@ Engine::Engine(Problem c) : case_(std::move(c)) {
     if (case_.model.kind == ModelKind::automatic) throw std::logic_error("a case whose model is not chosen yet");
     if (case_.unknowns == Unknowns::automatic)
         choice_ = choice_for(case_);
-    else if (!case_.is_axisymmetric())
+    else if (!case_.runs_in_tier_axisym())
         choice_.start.emplace(case_);
     if (case_.unknowns == Unknowns::surface_equilibrium) surface3d::check_equilibrium(case_, *choice_.start);
 }
@@ -41,7 +41,7 @@ std::vector<std::string> Engine::series_names() const {
 }
 
 void Engine::check_restart(const Record& record) const {
-    if (case_.is_axisymmetric() || (case_.unknowns == Unknowns::automatic && !record.mesh))
+    if (case_.runs_in_tier_axisym() || (case_.unknowns == Unknowns::automatic && !record.mesh))
         axisym::check_restart(record);
     else if (case_.unknowns != Unknowns::surface && !case_.is_equilibrium())
         surface3d::check_restart(case_, record);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cmath>
 #include <new>
 #include <string>
@@ -11,6 +10,7 @@
 #include "common/case/read.hpp"
 #include "common/case/toml_input.hpp"
 #include "common/result/durable_io.hpp"
+#include "common/series/table.hpp"
 #include "tools/run/case_checks.hpp"
 #include "tools/run/forecast.hpp"
 
@@ -38,14 +38,12 @@ void blame_extreme_numbers(const Problem& c, StopReport& stop) {
 // Hands everything on, and keeps what the end is reported by.
 class Watched : public PassingOn {
 public:
-    Watched(const Engine& engine, RunObserver& to) : PassingOn(to), case_(engine.problem()) {
-        const std::vector<std::string> series = engine.series_names();
-        defect_column_ = static_cast<std::size_t>(std::ranges::find(series, "identity_defect") - series.begin());
-    }
+    Watched(const Engine& engine, RunObserver& to)
+        : PassingOn(to), case_(engine.problem()), series_(engine.series_names()) {}
     void row(std::span<const double> values) override {
         PassingOn::row(values);
         reached = values.front();
-        if (defect_column_ < values.size()) defect = std::max(defect, std::abs(values[defect_column_]));
+        defect = std::fmax(defect, std::abs(value_in(values, series_, "identity_defect")));
     }
     void frame(const std::function<Record()>& make) override {
         if (std::exchange(has_frame_, true)) return PassingOn::frame(make);
@@ -63,7 +61,7 @@ public:
 
 private:
     const Problem& case_;
-    std::size_t defect_column_;
+    std::vector<std::string> series_;
     bool has_frame_ = false;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "common/series/table.hpp"
 #include "common/solve/pause.hpp"
 
 namespace tubule {
@@ -18,10 +19,7 @@ TrialRun::TrialRun(const Engine& engine, const TrialLimits& limits) : limits_(li
 
 void TrialRun::row(std::span<const double> values) {
     if (rows_++ == 0) first_row_ = std::clock();
-    const auto value = [&](const char* name) {
-        const auto column = static_cast<std::size_t>(std::ranges::find(series_, name) - series_.begin());
-        return column < values.size() ? values[column] : 0;
-    };
+    const auto value = [&](const char* name) { return value_in(values, series_, name); };
     if (energies.empty()) area = value("area"), r_max = value("r_max");
     energies.add(values[0], value("energy"));
 }

@@ -4,9 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
+#include <stdexcept>
 
 #include "common/case/input_file.hpp"
 #include "common/case/read.hpp"
@@ -49,30 +49,23 @@ std::vector<std::string> split_list(const std::string& text) {
     return parts;
 }
 
-// lo:hi:n or lo:hi:n:log as values; nothing if it has not that form.
+// A range as values; nothing if the text is a list.
 std::optional<Axis> parse_range(const std::string& text, const std::string& source) {
-    const std::vector<std::string> parts = split(text, ':');
-    if (parts.size() < 2 || text.find_first_of("\"'[{") != std::string::npos) return std::nullopt;
-    const auto refuse = [&](const std::string& why) {
-        throw CaseError(
-            fmt::format("{}: {}; a range is lo:hi:n, or lo:hi:n:log, n >= 2 values from lo to hi", source, why));
-    };
-    if (parts.size() < 3 || parts.size() > 4) refuse("not a range");
-    const auto lo = number_of(parts[0]), hi = number_of(parts[1]), count = number_of(parts[2]);
-    if (!lo || !hi || !count) refuse("not a number");
-    if (*count != std::floor(*count) || *count < 2) refuse(fmt::format("{} values", parts[2]));
-    if (*count > static_cast<double>(most_points)) refuse(fmt::format("more than {} values", most_points));
-    if (!(*hi > *lo)) refuse(fmt::format("the range is empty: {} is not above {}", parts[1], parts[0]));
+    if (text.find(':') == text.npos || text.find_first_of("\"'[{") != text.npos) return std::nullopt;
+    NumberRange range;
+    try {
+        range = tubule::parse_range(text, most_points, true);
+    } catch (const std::invalid_argument& error) {
+        throw CaseError(fmt::format("{}: {}; a range is lo:hi:n, or lo:hi:n:log, n >= 2 values from lo to hi", source,
+                                    error.what()));
+    }
     Axis axis;
-    axis.logarithmic = parts.size() == 4;
-    if (axis.logarithmic && parts[3] != "log") refuse(fmt::format("'{}' is not 'log'", parts[3]));
-    if (axis.logarithmic && !(*lo > 0)) refuse("a logarithmic range must begin above 0");
-    const auto n = static_cast<std::size_t>(*count);
-    for (std::size_t i = 0; i < n; ++i) {
-        const double part = static_cast<double>(i) / static_cast<double>(n - 1);
-        double value = axis.logarithmic ? *lo * std::pow(*hi / *lo, part) : *lo + (*hi - *lo) * part;
-        if (i + 1 == n) value = *hi;
-        axis.values.push_back({fmt::format("{}", value)});
+    axis.logarithmic = range.logarithmic;
+    for (std::size_t i = 0; i < range.n; ++i) {
+        const double part = static_cast<double>(i) / static_cast<double>(range.n - 1);
+        const double value = range.logarithmic ? range.lo * std::pow(range.hi / range.lo, part)
+                                               : range.lo + (range.hi - range.lo) * part;
+        axis.values.push_back({fmt::format("{}", i + 1 == range.n ? range.hi : value)});
     }
     return axis;
 }
@@ -121,10 +114,9 @@ BoundaryChoice boundary_of(const Scan& scan, const ScanChoices& file, const Scan
         if (!choice.around || choice.around == Outcome::not_run) {
             std::vector<std::string> names = outcome_names();
             names.front() = "outcome";
-            const auto meant = near_miss(name, names);
             throw CaseError(fmt::format("{} must be one of {}, not '{}'{}",
                                         named(!given.boundary.empty(), scan, "boundary"), fmt::join(names, ", "), name,
-                                        meant ? fmt::format("; did you mean '{}'?", *meant) : ""));
+                                        meant_by(name, names)));
         }
     }
     choice.seeds = given.seeds.value_or(file.seeds.value_or(choice.seeds));
@@ -166,7 +158,7 @@ void refuse_doubled_keys(const Scan& scan) {
                     fmt::format("{0}: {1} varies twice: give all its values at once, such as --over {1}=0,0.1,0.2",
                                 scan.path, key));
     for (const std::string& set : scan.sets)
-        if (const std::string key = set.substr(0, set.find('=')); keys.contains(key))
+        if (const std::string key = key_of(set); keys.contains(key))
             throw CaseError(fmt::format("{}: --set {}: the scan varies {}", scan.path, set, key));
 }
 
@@ -205,23 +197,10 @@ void check_points(const Scan& scan) {
 
 }  // namespace
 
-std::optional<double> number_of(const std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-    return value;
-}
-
-std::size_t Scan::size() const {
-    std::size_t n = 1;
-    for (const Axis& axis : axes) n *= axis.size();
-    return n;
-}
-
-std::vector<std::size_t> Scan::place(std::size_t point) const {
-    std::vector<std::size_t> at(axes.size());
-    for (std::size_t a = axes.size(); a-- > 0; point /= axes[a].size()) at[a] = point % axes[a].size();
-    return at;
+GridShape Scan::shape() const {
+    GridShape shape;
+    for (const Axis& axis : axes) shape.push_back(axis.size());
+    return shape;
 }
 
 BetweenNumbers Scan::between() const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/case/case.hpp"
+#include "common/case/text.hpp"
 #include "tools/scan/outcome.hpp"
 #include "tools/scan/plan.hpp"
 
@@ -41,10 +42,11 @@ struct Scan {
     std::optional<BoundaryChoice> boundary;
     bool to_the_end = false;  // run every point to its own end, even where its outcome is known before
 
-    std::size_t size() const;  // of the grid
+    GridShape shape() const;
+    std::size_t size() const { return count_points(shape()); }  // of the grid
     BetweenNumbers between() const;
-    double value(const Between& between) const;                 // of the axis' key
-    std::vector<std::size_t> place(std::size_t point) const;    // on each axis
+    double value(const Between& between) const;                                                   // of the axis' key
+    std::vector<std::size_t> place(std::size_t point) const { return place_on(shape(), point); }  // on each axis
     std::vector<std::string> sets_of(std::size_t point) const;  // also of points between those of the grid
     Case case_of(std::size_t point) const;                      // throws CaseError
     Case case_with(const std::vector<std::string>& all_sets) const;
@@ -73,9 +75,6 @@ Scan read_scan(const ScanChoices& choices);
 
 // The same of a case at hand: `choices.file` and `choices.sets` are not looked at.
 Scan scan_of(const Case& c, const ScanChoices& choices);
-
-// A value of an axis as a number, if it is one.
-std::optional<double> number_of(const std::string& value);
 
 // "energy.k42=0:0.2:5" and so on as an axis. Throws CaseError.
 Axis parse_axis(const std::string& over);

@@ -18,10 +18,6 @@
 namespace tubule {
 namespace {
 
-std::string key_of(const std::string& set) {
-    return set.substr(0, set.find('='));
-}
-
 const Axis* axis_of(const Scan& scan, const std::vector<std::string>& keys) {
     const auto same = std::ranges::find_if(scan.axes, [&](const Axis& axis) { return axis.keys == keys; });
     return same == scan.axes.end() ? nullptr : &*same;

@@ -5,18 +5,6 @@
 namespace tubule {
 namespace {
 
-std::vector<std::size_t> strides(const std::vector<std::size_t>& shape) {
-    std::vector<std::size_t> stride(shape.size(), 1);
-    for (std::size_t a = shape.size(); a-- > 1;) stride[a - 1] = stride[a] * shape[a];
-    return stride;
-}
-
-std::size_t product(const std::vector<std::size_t>& shape) {
-    std::size_t n = 1;
-    for (const std::size_t extent : shape) n *= extent;
-    return n;
-}
-
 // Whether a line runs between two outcomes.
 bool line_between(Outcome a, Outcome b, std::optional<Outcome> around) {
     return a != b && (!around || a == *around || b == *around);
@@ -39,19 +27,37 @@ void for_each_place(const std::vector<std::vector<std::size_t>>& places, const s
 
 }  // namespace
 
-Plan::Plan(std::vector<std::size_t> shape) : shape_(std::move(shape)), stride_(strides(shape_)) {
-    outcomes_.assign(product(shape_), Outcome::not_run);
+std::size_t count_points(const GridShape& shape) {
+    std::size_t n = 1;
+    for (const std::size_t extent : shape) n *= extent;
+    return n;
+}
+
+std::vector<std::size_t> strides(const GridShape& shape) {
+    std::vector<std::size_t> stride(shape.size(), 1);
+    for (std::size_t a = shape.size(); a-- > 1;) stride[a - 1] = stride[a] * shape[a];
+    return stride;
+}
+
+std::vector<std::size_t> place_on(const GridShape& shape, std::size_t point) {
+    std::vector<std::size_t> at(shape.size());
+    for (std::size_t a = shape.size(); a-- > 0; point /= shape[a]) at[a] = point % shape[a];
+    return at;
+}
+
+Plan::Plan(GridShape shape) : shape_(std::move(shape)), stride_(strides(shape_)) {
+    outcomes_.assign(count_points(shape_), Outcome::not_run);
     wanted_.assign(outcomes_.size(), 0);
     for (std::size_t i = 0; i < outcomes_.size(); ++i) want(i);
 }
 
-Plan::Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around, int halvings)
+Plan::Plan(GridShape shape, int seeds, std::optional<Outcome> around, int halvings)
     : shape_(std::move(shape)),
       stride_(strides(shape_)),
       follows_(true),
       around_(around),
-      numbers_{product(shape_), shape_.size(), halvings} {
-    outcomes_.assign(product(shape_), Outcome::not_run);
+      numbers_{count_points(shape_), shape_.size(), halvings} {
+    outcomes_.assign(numbers_.grid, Outcome::not_run);
     wanted_.assign(outcomes_.size(), 0);
     waiting_.resize(outcomes_.size());
     std::vector<std::vector<std::size_t>> nodes;
@@ -73,12 +79,6 @@ Plan::Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> aro
             bisect(point, point + (next - at) * stride_[a]);
         });
     }
-}
-
-std::vector<std::size_t> Plan::place(std::size_t point) const {
-    std::vector<std::size_t> at(shape_.size());
-    for (std::size_t a = 0; a < shape_.size(); ++a) at[a] = point / stride_[a] % shape_[a];
-    return at;
 }
 
 bool Plan::differ(std::size_t a, std::size_t b) const {
@@ -198,7 +198,7 @@ void Plan::done(std::size_t point, Outcome outcome) {
     look_around(point);
 }
 
-std::vector<Edge> boundary_edges(const std::vector<std::size_t>& shape, const std::vector<Outcome>& outcomes,
+std::vector<Edge> boundary_edges(const GridShape& shape, const std::vector<Outcome>& outcomes,
                                  std::optional<Outcome> around) {
     const auto stride = strides(shape);
     std::vector<Edge> edges;

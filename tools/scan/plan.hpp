@@ -12,6 +12,13 @@
 
 namespace tubule {
 
+// How many values each axis of a grid has. Points are numbered row by row, the last axis fastest.
+using GridShape = std::vector<std::size_t>;
+std::size_t count_points(const GridShape& shape);
+// From a point to the next one, along each axis; and where it is on each.
+std::vector<std::size_t> strides(const GridShape& shape);
+std::vector<std::size_t> place_on(const GridShape& shape, std::size_t point);
+
 // ---- points between those of the grid, where a line is traced more finely than by the grid
 
 // On the edge from a point of the grid to the next one along an axis, `step` of 2^halvings steps on.
@@ -44,9 +51,9 @@ using Edge = std::pair<std::size_t, std::size_t>;
 class Plan {
 public:
     // All points of a grid of this shape, row by row.
-    explicit Plan(std::vector<std::size_t> shape);
+    explicit Plan(GridShape shape);
     // Along the lines between all outcomes, or between one outcome and the others.
-    Plan(std::vector<std::size_t> shape, int seeds, std::optional<Outcome> around, int halvings = 0);
+    Plan(GridShape shape, int seeds, std::optional<Outcome> around, int halvings = 0);
 
     std::optional<std::size_t> next();              // a point to run, if there is one by now
     void done(std::size_t point, Outcome outcome);  // also of points that were run before a resume
@@ -68,9 +75,10 @@ private:
     Outcome outcome(std::size_t point) const;  // of any
     void want_cells_beside(std::size_t a, std::size_t b);
     bool differ(std::size_t a, std::size_t b) const;
-    std::vector<std::size_t> place(std::size_t point) const;
+    std::vector<std::size_t> place(std::size_t point) const { return place_on(shape_, point); }
 
-    std::vector<std::size_t> shape_, stride_;
+    GridShape shape_;
+    std::vector<std::size_t> stride_;
     bool follows_ = false;
     std::optional<Outcome> around_;
     std::vector<Outcome> outcomes_;  // on the grid
@@ -84,7 +92,7 @@ private:
 };
 
 // All edges of a grid whose ends differ, both known.
-std::vector<Edge> boundary_edges(const std::vector<std::size_t>& shape, const std::vector<Outcome>& outcomes,
+std::vector<Edge> boundary_edges(const GridShape& shape, const std::vector<Outcome>& outcomes,
                                  std::optional<Outcome> around = std::nullopt);
 
 }  // namespace tubule

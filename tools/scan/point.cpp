@@ -10,15 +10,16 @@
 
 #include "axisym/curve/curve_measures.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
-#include "axisym/graph/graph_forms.hpp"
+#include "axisym/graph/graph_mesh.hpp"
 #include "axisym/graph/graph_output.hpp"
 #include "common/case/read.hpp"
 #include "common/result/frame_profile.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/series/table.hpp"
 #include "common/solve/dense.hpp"
 #include "common/solve/interrupt.hpp"
 #include "tools/run/run_to_end.hpp"
-#include "tools/scan/uniform_fate.hpp"
+#include "tools/scan/uniform_end.hpp"
 
 namespace tubule {
 namespace {
@@ -37,24 +38,17 @@ double cpu_seconds() {
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-int column(const std::vector<std::string>& series, const char* name) {
-    const auto found = std::find(series.begin(), series.end(), name);
-    return found == series.end() ? -1 : static_cast<int>(found - series.begin());
-}
-
-// Keeps the last row and the last frame, and ends the run when its fate is known.
+// Keeps the last row and the last frame, and ends the run when its outcome is known.
 class Watch : public RunObserver {
 public:
-    Watch(const Problem& c, const std::vector<std::string>& series, bool to_the_end) {
-        for (const char* name : {"energy", "volume", "r_min", "r_max", "area"})
-            columns_.push_back(column(series, name));
-        if (!to_the_end) fate_ = UniformFate::of(c);
-        keeps_frame_ = c.time.stationary.has_value();
+    Watch(const Problem& c, std::vector<std::string> series, bool to_the_end)
+        : keeps_frame_(c.time.stationary.has_value()), series_(std::move(series)) {
+        if (!to_the_end) uniform_end_ = UniformEnd::of(c);
     }
 
     void row(std::span<const double> values) override {
         row_.assign(values.begin(), values.end());
-        decided = fate_ && fate_->decided({last(0), last(1), last(2), last(3)});
+        decided = uniform_end_ && uniform_end_->decided({last("energy"), last("volume"), last("r_min"), last("r_max")});
     }
     void frame(const std::function<Record()>& make) override {
         if (keeps_frame_) last_frame = make();
@@ -66,21 +60,17 @@ public:
     }
     bool interrupted() override { return decided || tubule::interrupted(); }
 
-    double energy() const { return last(0); }
-    EndShape end(bool periodic) const { return {periodic, last(2), last(3), last(4), last(1)}; }
+    EndShape end(bool periodic) const { return {periodic, last("r_min"), last("r_max"), last("area"), last("volume")}; }
 
     bool decided = false;
     std::optional<Record> last_frame;
 
 private:
-    double last(std::size_t which) const {
-        const int at = columns_[which];
-        return at < 0 || at >= static_cast<int>(row_.size()) ? unknown : row_[static_cast<std::size_t>(at)];
-    }
+    double last(const char* name) const { return value_in(row_, series_, name); }
 
-    std::optional<UniformFate> fate_;
+    std::optional<UniformEnd> uniform_end_;
     bool keeps_frame_;
-    std::vector<int> columns_;
+    std::vector<std::string> series_;
     std::vector<double> row_;
 };
 
@@ -92,11 +82,10 @@ enum class Rest { here, on_its_way, on_a_saddle };
 Rest rest_of(const Problem& c, const Record& frame, double r_min, double r_max) {
     if (kind_of(frame) != RecordKind::graph) return Rest::here;
     const axisym::GraphRestart state = axisym::graph_restart(frame);
-    const int order = c.discretisation.order;
-    const axisym::SplineSpace space(state.cell, state.breaks, order, c.discretisation.smoothness.value_or(order - 1));
-    const axisym::Forms forms(space, c.energy, loads_at(c.law, 0));
-    const Eigen::MatrixXd hessian = forms.hessian(state.coefficients), mass = forms.mass(state.coefficients);
-    const std::optional<Eigenpairs> modes = eigenpairs(hessian, mass);
+    const axisym::GraphMesh mesh(state.cell, state.breaks, c);
+    const axisym::Forms& forms = mesh.forms;
+    const std::optional<Eigenpairs> modes =
+        eigenpairs(forms.hessian(state.coefficients), forms.mass(state.coefficients));
     if (!modes) return Rest::on_its_way;
     const Eigen::VectorXd& rate = modes->values;
     const double none = translation * rate.cwiseAbs().maxCoeff();

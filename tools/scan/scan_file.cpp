@@ -47,7 +47,7 @@ void put_named(hid_t parent, const std::string& name, const std::vector<std::siz
 
 void put_points(hid_t file, const ScanResult& result) {
     const auto group = make_group(file, "points");
-    const auto shape = result.shape();
+    const auto shape = result.scan.shape();
     std::vector<std::int8_t> outcomes, stops;
     std::vector<std::string> messages;
     for (const PointResult& p : result.points) {
@@ -96,7 +96,7 @@ void put_crossings(hid_t file, const ScanResult& result) {
     const ScanPlan whole = plan_of(result);
     const Plan& plan = whole.nodes();
     std::vector<double> ends;
-    for (const Edge& edge : boundary_edges(result.shape(), result.outcomes(), result.scan.boundary->around)) {
+    for (const Edge& edge : boundary_edges(result.scan.shape(), result.outcomes(), result.scan.boundary->around)) {
         Between at = plan.between(edge, 0);
         const auto [from, to] = plan.crossing(edge);
         for (const std::size_t step : {from, to}) {
@@ -317,12 +317,6 @@ void refuse_to_replace_another_scan(const Scan& scan, const fs::path& file) {
         "{}: holds another scan than that of {}\n--overwrite replaces it, -o FILE keeps both, --extend adds "
         "values to it",
         file.string(), scan.path));
-}
-
-std::vector<std::size_t> ScanResult::shape() const {
-    std::vector<std::size_t> shape;
-    for (const Axis& axis : scan.axes) shape.push_back(axis.size());
-    return shape;
 }
 
 std::vector<Outcome> ScanResult::outcomes() const {

@@ -21,7 +21,6 @@ struct ScanResult {
     std::vector<PointResult> points;          // of the whole grid, in order; Outcome::not_run where nothing is known
     std::map<std::size_t, PointResult> more;  // by number: between points of the grid, or where energies are equal
 
-    std::vector<std::size_t> shape() const;
     std::vector<Outcome> outcomes() const;
     // A point of the grid or one of `more`, if it is known.
     const PointResult* known(std::size_t number) const;

@@ -35,7 +35,7 @@ double free_energy(const PointResult& p) {
 
 // The places of two neighbours along an axis, for both neighbours of a node that there are: lower and upper one.
 std::vector<std::array<std::size_t, 2>> edges_at(const Nodes& nodes, std::size_t node, std::size_t axis) {
-    const std::size_t stride = nodes.stride(axis), size = nodes.shape()[axis], at = node / stride % size;
+    const std::size_t stride = nodes.stride(axis), size = nodes.shape()[axis], at = place_on(nodes.shape(), node)[axis];
     std::vector<std::array<std::size_t, 2>> edges;
     if (at > 0) edges.push_back({node - stride, node});
     if (at + 1 < size) edges.push_back({node, node + stride});
@@ -101,12 +101,6 @@ Nodes::Nodes(const Scan& scan) : starts_axis_(start_axis(scan)) {
         if (is_starts) starts_ = scan.axes[a].size();
         if (starts_axis_ && a > *starts_axis_) inner_ *= scan.axes[a].size();
     }
-}
-
-std::size_t Nodes::stride(std::size_t axis) const {
-    std::size_t stride = 1;
-    for (std::size_t a = shape_.size(); a-- > axis + 1;) stride *= shape_[a];
-    return stride;
 }
 
 std::size_t Nodes::node_of(std::size_t point) const {
@@ -211,7 +205,7 @@ PointResult find_crossing(const Scan& scan, const EnergyCrossing& crossing) {
 }
 namespace {
 
-Plan plan_on(const std::vector<std::size_t>& shape, const std::optional<BoundaryChoice>& boundary) {
+Plan plan_on(const GridShape& shape, const std::optional<BoundaryChoice>& boundary) {
     return boundary ? Plan(shape, boundary->seeds, boundary->around, boundary->refine) : Plan(shape);
 }
 

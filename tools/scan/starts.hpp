@@ -26,15 +26,15 @@ public:
     explicit Nodes(const Scan& scan);  // with or without an axis of starts
 
     bool has_starts() const { return starts_axis_.has_value(); }
-    const std::vector<std::size_t>& shape() const { return shape_; }  // 1 along the axis of starts
+    const GridShape& shape() const { return shape_; }  // 1 along the axis of starts
     std::size_t starts() const { return starts_; }
-    std::size_t stride(std::size_t axis) const;  // to the next node along an axis
+    std::size_t stride(std::size_t axis) const { return strides(shape_)[axis]; }  // to the next node along an axis
     std::size_t node_of(std::size_t point) const;
     std::size_t point_of(std::size_t node, std::size_t start) const;
 
 private:
     std::optional<std::size_t> starts_axis_;
-    std::vector<std::size_t> shape_;
+    GridShape shape_;
     std::size_t starts_ = 1, inner_ = 1;  // points along the axes behind that of starts
 };
 

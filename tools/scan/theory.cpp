@@ -7,10 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "common/case/read.hpp"
-#include "common/theory/waves.hpp"
+#include "common/theory/dispersion.hpp"
 #include "tools/scan/starts.hpp"
 
 namespace tubule {
@@ -18,15 +17,6 @@ namespace {
 
 constexpr std::size_t most_nodes = 41;   // along an axis where lines are looked for: fewer than a map has
 constexpr std::size_t fine_enough = 65;  // where they are drawn
-
-// How many cells an initial shape with modes (n, 0) alone repeats in its length. Tier 1
-// keeps that symmetry.
-int repeats(const Tube& tube) {
-    int waves = 0;
-    for (const TubeMode& mode : tube.modes)
-        if (mode.amplitude != 0) waves = mode.m == 0 ? std::gcd(waves, mode.n) : 1;
-    return waves;
-}
 
 // E = INT k20 (H-H0)^2, and area differences.
 bool only_k20(const Bending& energy) {
@@ -43,7 +33,7 @@ std::optional<double> delaunay_period(const Problem& c) {
     const auto* tube = std::get_if<Tube>(&c.shape);
     const MotionLaw& law = c.law;
     if (!tube || !law.unconstrained() || !law.without_loads()) return std::nullopt;
-    const int waves = repeats(*tube);
+    const int waves = common_waves(*tube);
     if (!only_k20(c.energy) || c.energy.alpha || waves == 0) return std::nullopt;
     return tube->length / waves;
 }
@@ -93,7 +83,7 @@ std::optional<double> driven_most(const Problem& c, int m) {
     const auto& shape = std::get<Tube>(c.shape);
     const theory::Stiffness G = theory::stiffness(*tube, m);
     if (!G.rises()) return std::nullopt;  // ill-posed: there is no such wave
-    const double longest = 2 * std::numbers::pi * (m == 0 ? std::max(repeats(shape), 1) : 1) / shape.length;
+    const double longest = 2 * std::numbers::pi * (m == 0 ? std::max(common_waves(shape), 1) : 1) / shape.length;
     // Where dG/d(q^2) = 3 q6 q^4 + 2 q4 q^2 + q2 vanishes last.
     const double root = std::sqrt(std::max(G.q4 * G.q4 - 3 * G.q6 * G.q2, 0.0));
     const double square = G.q4 + root > 0 ? -G.q2 / (G.q4 + root) : (root - G.q4) / (3 * G.q6);

@@ -13,19 +13,18 @@ struct TubeState {
     double energy = 0, volume = 0, r_min = 0, r_max = 0;
 };
 
-class UniformFate {
+class UniformEnd {
 public:
     // Empty where the relation does not apply: other models and shapes, a volume that is kept, an f with f_HK.
-    static std::optional<UniformFate> of(const Problem& c);
+    static std::optional<UniformEnd> of(const Problem& c);
 
     // Whether the waves are small, in amplitude and in energy, and each that the symmetry of the start allows decays
     // relative to the radius, by a margin, at every radius from here to the one where the tube rests.
     bool decided(const TubeState& s) const;
 
 private:
-    UniformFate(const Bending& energy, double length, int waves, double floor)
+    UniformEnd(const Bending& energy, double length, int waves, double floor)
         : energy_(energy), length_(length), waves_(waves), floor_(floor) {}
-    double drift(double R) const;
     bool waves_decay(double R) const;
     double radius_at_rest(double R) const;
 
