@@ -1,6 +1,4 @@
 // Distances of curved surfaces, where they are known in closed form or by other means.
-#include "tools/compare/distance.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -15,6 +13,7 @@
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "surface3d/mesh/reference_triangle.hpp"
 #include "tests/support/message_of.hpp"
+#include "tools/compare/alignment.hpp"
 #include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare::distance_test {

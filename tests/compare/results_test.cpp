@@ -11,6 +11,7 @@
 #include "surface3d/mesh/base_meshes.hpp"
 #include "surface3d/mesh/mapped_mesh.hpp"
 #include "tests/support/message_of.hpp"
+#include "tools/compare/series.hpp"
 
 namespace tubule::compare::results_test {
 

@@ -23,6 +23,7 @@
 #include "tools/run/case_checks.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
+#include "tools/run/model_choice.hpp"
 
 namespace tubule {
 

@@ -10,7 +10,7 @@
 #include "common/case/problem.hpp"
 #include "common/result/result.hpp"
 #include "common/run/run_observer.hpp"
-#include "tools/run/advice.hpp"
+#include "tools/run/model_choice.hpp"
 #include "tools/scan/ranks.hpp"
 
 namespace CLI {

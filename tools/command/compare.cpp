@@ -21,6 +21,7 @@
 #include "tools/command/output.hpp"
 #include "tools/command/python.hpp"
 #include "tools/compare/results.hpp"
+#include "tools/compare/series.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/scan/description.hpp"
 

@@ -29,11 +29,11 @@
 #include "tools/command/options.hpp"
 #include "tools/command/output.hpp"
 #include "tools/command/units.hpp"
-#include "tools/run/advice.hpp"
 #include "tools/run/case_checks.hpp"
 #include "tools/run/continuation.hpp"
 #include "tools/run/engine.hpp"
 #include "tools/run/forecast.hpp"
+#include "tools/run/model_choice.hpp"
 #include "tools/run/run_to_end.hpp"
 
 namespace tubule {

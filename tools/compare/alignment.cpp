@@ -1,3 +1,5 @@
+#include "tools/compare/alignment.hpp"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -7,7 +9,6 @@
 #include "common/geometry/profile_point.hpp"
 #include "common/solve/parallel.hpp"
 #include "common/solve/pause.hpp"
-#include "tools/compare/distance.hpp"
 #include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare {

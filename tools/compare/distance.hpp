@@ -30,9 +30,4 @@ struct Distance {
 // differ.
 Distance distance(const Surface& a, const Surface& b, const RigidMotion& motion = {});
 
-// The motion of `b` that minimises the mean square distance of `a` from it, as far as a search from many initial
-// guesses finds it: translations and rotations of closed surfaces, translations and rotations about z of tubes, motions
-// that preserve the axis for two surfaces of revolution. Throws as distance does.
-RigidMotion alignment(const Surface& a, const Surface& b);
-
 }  // namespace tubule::compare

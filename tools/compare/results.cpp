@@ -10,6 +10,7 @@
 #include "common/result/frame_profile.hpp"
 #include "common/result/record.hpp"
 #include "surface3d/run/mesh_record.hpp"
+#include "tools/compare/alignment.hpp"
 #include "tools/compare/surfaces.hpp"
 
 namespace tubule::compare {

@@ -1,3 +1,4 @@
+#include "tools/compare/series.hpp"
 
 #include <algorithm>
 #include <cmath>

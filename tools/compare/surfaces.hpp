@@ -63,10 +63,9 @@ inline void require_same_kind(const Surface& a, const Surface& b) {
         throw std::invalid_argument("one is " + words(a) + ", the other is " + words(b));
 }
 
-// A surface of revolution as a frame of tier axisym holds it.
-
-// Points are sought in the half plane (r, z), by Newton's method from the pieces of the profile that can be nearest. A
-// Place is (s, theta): s from 0 to 1 along the profile, theta the angle around the axis; there is only one piece.
+// A surface of revolution as a frame of tier axisym holds it. Points are sought in the half plane (r, z), by Newton's
+// method from the pieces of the profile that can be nearest. A Place is (s, theta): s from 0 to 1 along the profile,
+// theta the angle around the axis; there is only one piece.
 class RevolutionSurface final : public Surface {
 public:
     explicit RevolutionSurface(PerturbedCurve curve);
@@ -92,9 +91,8 @@ private:
     surface3d::BoxTree<2> tree_;
 };
 
-// A surface of curved triangles P_k as a frame of tier surface3d holds it.
-
-// Nearest points are exact up to rounding. A Place is a triangle and (xi, eta).
+// A surface of curved triangles P_k as a frame of tier surface3d holds it. Nearest points are exact up to rounding. A
+// Place is a triangle and (xi, eta).
 class TriangleSurface final : public Surface {
 public:
     // Throws std::invalid_argument for an order other than 1 ... 4 and lengths that do not fit.

@@ -15,6 +15,7 @@
 #include "common/theory/dispersion.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "tools/scan/outcome.hpp"
+#include "tools/scan/plan.hpp"
 #include "tools/scan/point.hpp"
 
 namespace tubule::confirm {
@@ -106,7 +107,7 @@ struct Pick {
 // At most `count` points that were run and did not fail, of a grid of this shape: half of them both sides of lines
 // between outcomes (pairs of outcomes that are not there yet first, then far from those that are), a quarter corners of
 // the grid, the rest at random. If one kind has too few, the next gets more. The same seed picks the same points.
-std::vector<Pick> pick_points(const std::vector<std::size_t>& shape, const std::vector<Outcome>& outcomes,
+std::vector<Pick> pick_points(const GridShape& shape, const std::vector<Outcome>& outcomes,
                               std::optional<Outcome> around, std::size_t count, unsigned seed);
 
 }  // namespace tubule::confirm

@@ -9,7 +9,7 @@
 #include "common/case/problem.hpp"
 #include "common/result/record.hpp"
 #include "common/run/run_observer.hpp"
-#include "tools/auto/auto_run.hpp"
+#include "tools/auto/choice.hpp"
 
 namespace tubule {
 

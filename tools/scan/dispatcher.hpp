@@ -11,7 +11,7 @@
 #include "common/solve/progress.hpp"
 #include "tools/scan/ranks.hpp"
 #include "tools/scan/scan_file.hpp"
-#include "tools/scan/starts.hpp"
+#include "tools/scan/scan_plan.hpp"
 
 namespace tubule {
 

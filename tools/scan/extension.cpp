@@ -13,7 +13,7 @@
 #include "common/case/read.hpp"
 #include "common/solve/pause.hpp"
 #include "tools/run/continuation.hpp"
-#include "tools/scan/starts.hpp"
+#include "tools/scan/scan_plan.hpp"
 
 namespace tubule {
 namespace {

@@ -10,7 +10,7 @@
 #include "common/result/result.hpp"
 #include "tools/scan/description.hpp"
 #include "tools/scan/point.hpp"
-#include "tools/scan/starts.hpp"
+#include "tools/scan/scan_plan.hpp"
 #include "tools/scan/theory.hpp"
 
 namespace tubule {

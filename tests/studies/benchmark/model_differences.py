@@ -20,7 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-VISCOUS, SLOWER = 2.0, 4.5  # as in tools/run/advice.cpp
+VISCOUS, SLOWER = 2.0, 4.5  # as in tools/run/model_choice.cpp
 RE, GAMMA = (0.05, 0.3, 2), (0, 3, 30, 300)
 COLUMNS = ("scene", "Re", "gamma", "length", "fall", "stokes", "stokes_expected", "stokes_end", "overdamped",
            "overdamped_expected", "overdamped_end", "fluid_cpu_s", "stokes_cpu_s", "overdamped_cpu_s")  # fmt: skip
