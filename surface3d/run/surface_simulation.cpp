@@ -461,6 +461,8 @@ std::string SurfaceSimulation::advice_where_it_fails() const {
     if (law.beads && law.beads->extension && !law.area_is_free() && law.keeps_volume)
         return "fixed area and volume allow only some distances of the beads: free one of them, end the extension "
                "earlier, or try another discretisation.elements";
+    if (const auto step = case_.surface.step)
+        return fmt::format("discretisation.step = {:g} may be too long: leave it out, or try {:g}", *step, *step / 10);
     return "try another discretisation.elements or discretisation.order";
 }
 

@@ -171,8 +171,8 @@ std::string balance_warning(const Problem& c, const RunSummary& s, double identi
     return fmt::format(
         "the energy balance is off by {:.2g}, {:.2g} of E_ref (series identity_defect): so much energy came or went "
         "with the mesh and the steps, not with the membrane, and times and energies are uncertain by as much; a "
-        "smoother initial shape, more elements or a tighter accuracy.energy make it smaller",
-        std::abs(identity_defect), part);
+        "smoother initial shape, more elements or a {} make it smaller",
+        std::abs(identity_defect), part, c.surface.step ? "smaller discretisation.step" : "tighter accuracy.energy");
 }
 
 }  // namespace tubule
