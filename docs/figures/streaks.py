@@ -65,7 +65,7 @@ def draw(path, outputs):
         middle = (k + 0.5) / len(shapes)
         figure.text(middle, 1 - 0.06 / figure.get_figheight(), f"t = {style.time_text(surface.time)}", ha="center", va="top")
         figure.text(middle, (FOOT + 0.05) / figure.get_figheight(), motion.words(surface).replace("\n", ", "), ha="center", fontsize=6.5)
-    draw_bars(figure, 0.05, [(colours, colours.label)])
+    draw_bars(figure, 0.05, [colours])
     style.save(figure, outputs)
 
 

@@ -138,7 +138,7 @@ class Pages(unittest.TestCase):
             if result.surfaces:
                 columns = tubes.choose_columns([result], None, attrgetter("surfaces"))
                 panel = surfaces.SurfacePanel([result], [[""]], columns, ["H", "K"])
-                printed = [quantity.colours for quantity in panel.quantities]
+                printed = list(panel.quantities.values())
             else:
                 printed = tubes.TubePanel([result], [[""]], tubes.choose_columns([result]), ["H", "K"]).colours
             shown = {field["name"]: field for field in data_of(made(command)[1])["fields"]}

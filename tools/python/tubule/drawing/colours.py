@@ -10,6 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from . import style
+from .flow import SYMBOLS, VELOCITY, draw_arrow_key
 from .labels import formula, in_unit, number, power
 from .units import OF_FRAMES
 
@@ -21,7 +22,6 @@ LONG, LETTER = 50, 0.047  # letters of a label above which it has two lines, and
 BAR_HEIGHT = 0.66  # inches of a colour bar with its label
 ROUNDING = 1e-9  # a uniform tube has K = 0 up to this; the colour scale must not magnify it
 MAPS = {"H": "PuOr", "K": "RdBu_r", "H0": "PuOr", "p": "PRGn"}
-SYMBOLS = {"u_n": "u\u2099", "H0": "H\u2080", "energy_density": "f"}
 LABELS = {
     "H": "mean curvature H = \u03ba\u2081 + \u03ba\u2082",
     "K": "Gaussian curvature K",
@@ -91,7 +91,7 @@ def colours_of(name, results, shapes, areas):
     one, label = results[0].scale(OF_FRAMES[name]), in_unit(LABELS[name], results[0].unit(OF_FRAMES[name]))
     if name == "u_n":
         largest = max(float(np.abs(v).max()) for v in values) or 1.0
-        return Colours("RdBu_r", Normalize(-largest, largest), "neither", label + ", > 0: outward")
+        return Colours(VELOCITY, Normalize(-largest, largest), "neither", label + ", > 0: outward")
     if name == "energy_density":
         low, high = covered_range(values, areas)
         low, high = min(0.0, low), MARGIN * high
@@ -110,22 +110,37 @@ def colours_of(name, results, shapes, areas):
     return Colours(MAPS[name], *scale, label + words)
 
 
+def relative_colours(words):
+    """Those of a quantity relative to its largest magnitude."""
+    return Colours(VELOCITY, Normalize(-1, 1), "neither", words)
+
+
+def normal_velocity(of):
+    return relative_colours(f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the {of}, > 0: outward")
+
+
 def bars_height(count):
     """Inches that so many colour bars need."""
     return BAR_HEIGHT * (count if style.is_narrow() else 1)
 
 
-def draw_bars(figure, bottom, shown):
-    """Colour bars, for a list of colours and labels."""
-    for (left, width, line), (colours, label) in zip(style.slots(len(shown)), shown):
-        draw_bar(figure, bottom + line * BAR_HEIGHT, left, width, ScalarMappable(colours.norm, colours.map), label, colours.extend)
+def draw_bars(figure, bottom, shown, arrow=""):
+    """Bars of a list of Colours; behind them the longest arrow, if there are words for it."""
+    room = style.slots(len(shown) + bool(arrow))
+    for slot, colours in zip(room, shown):
+        draw_bar(figure, bottom, slot, colours)
+    if arrow:
+        left, _, line = room[-1]
+        draw_arrow_key(figure, left, bottom + line * BAR_HEIGHT, arrow)
 
 
-def draw_bar(figure, bottom, left, width, mappable, label, extend="neither"):
-    """One colour bar in the 0.5 inches above `bottom`; `left` and `width` are parts of the page."""
+def draw_bar(figure, bottom, slot, colours):
+    """One colour bar above `bottom`; `slot` as style.slots() gives them."""
+    left, width, line = slot
     height, inches = figure.get_figheight(), width * figure.get_figwidth()
-    axes = figure.add_axes([left, (bottom + 0.38) / height, width, 0.09 / height])
-    bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=extend)
+    axes = figure.add_axes([left, (bottom + line * BAR_HEIGHT + 0.38) / height, width, 0.09 / height])
+    mappable, label = ScalarMappable(colours.norm, colours.map), colours.label
+    bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=colours.extend)
     bar.outline.set_linewidth(0.5)
     if len(label) > min(LONG, inches / LETTER):
         name, _, rest = label.partition(",")

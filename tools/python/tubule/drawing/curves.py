@@ -1,19 +1,17 @@
 """Panel of profiles that are not graphs r(z): sections through the axis, coloured by H and K, or other quantities; by the
 normal velocity with arrows for the velocity along the profile."""
 
-import matplotlib.pyplot as plt
+from operator import attrgetter
+
 import numpy as np
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.path import Path
 
-from . import style
-from .colours import BAR_HEIGHT, draw_bar
-from .flow import LONGEST_ARROW, SHORTEST_ARROW, SYMBOLS, VELOCITY, Motion, arrow_style, draw_arrow_key
-from .labels import power, symbol
-from .tubes import ProfilePanel, caption
+from .colours import normal_velocity
+from .flow import LONGEST_ARROW, SHORTEST_ARROW, SYMBOLS, arrow_style, motions_of
+from .labels import power
+from .tubes import ProfilePanel
 
 BAND, OUTLINE = 2.8, 3.8  # points: the coloured line, and its outline
 POINTS_PER_INCH, MIN_POINTS = 150, 200  # along a profile
@@ -60,37 +58,30 @@ class CurvePanel(ProfilePanel):
     COLUMN_GAP = 0.1
     MAX_LENGTH = 3.2
 
-    def __init__(self, results, labels, columns, names):
-        self.motions = [Motion(result.frames, result.unit("length/time"), result.scale("1/time")) for result in results]
+    def __init__(self, results, labels, columns, names, by_run=False):
         self.velocity = names == ["u_n"]
+        if self.velocity:
+            self.of, self.motions = "run" if by_run else "shape", motions_of(results, attrgetter("frames"), by_run)
+            if any(frame and frame.u_t is not None for column in columns for frame in column.cells):
+                u_t = SYMBOLS["u_t"]
+                self.arrow = f"velocity {u_t} along the profile;\nthis long: max |{u_t}| of the {self.of}"
         super().__init__(results, labels, columns, names)
 
-    def scale_by_run(self):
-        """Velocities are relative to the largest ones of their run, else of each shape."""
-        for motion in self.motions:
-            motion.by_run = True
-
-    def _choose_colours(self):
-        if not self.velocity:
-            super()._choose_colours()
+    def _choose_colours(self, results, frames, areas):
+        return [normal_velocity(self.of)] if self.velocity else super()._choose_colours(results, frames, areas)
 
     def _words(self, column, row):
-        frame, result = column.cells[row], self.results[row]
-        words = [caption(column, row, result)]
+        words, frame, result = super()._words(column, row), column.cells[row], self.results[row]
         if frame and frame.parameter is not None:
-            key = result.case.get("equilibrium", {}).get("branch", {}).get("vary", "parameter")
-            name = symbol(key.split(".")[-1]).replace("_", " ")
+            space = "\n" if len(result.parameter_name) > 8 else " "
             value = f"{power(frame.parameter, 4)} {result.parameter_unit}".rstrip()
-            words.append(f"{name}{chr(10) if len(name) > 8 else ' '}= {value}")
-        if self.velocity and frame and frame.u_n is not None:
-            words.append(self.motions[row].words(frame))
-        return "\n".join(word for word in words if word)
+            words.insert(1, f"{result.parameter_name}{space}= {value}")
+        return words
 
     def _draw_shape(self, axes, frame, row, places):
         ((x, y),) = places
         section = Section(frame, self.scale)
-        motion = self.motions[row]
-        u_n, u_t = motion.scale("u_n", frame), motion.scale("u_t", frame)
+        u_n, u_t = (self.motions[id(frame)].scale(name, frame) if self.velocity else 0 for name in ("u_n", "u_t"))
         closing = np.concatenate([section.x, -section.x[::-1]]), np.concatenate([section.y, section.y[::-1]])
         axes.fill(x + closing[0], y + closing[1], color="0.95", linewidth=0, zorder=0)
         for side in (-1, 1):
@@ -101,34 +92,17 @@ class CurvePanel(ProfilePanel):
             axes.add_collection(
                 LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
             )
-            for along in arrows(section, section.at(frame.u_t), u_t) if self.velocity and u_t else ():
+            for along in arrows(section, section.at(frame.u_t), u_t) if u_t else ():
                 way_x, way_y = section.beside(along, ARROW_DISTANCE)
                 way = Path(np.column_stack([x + side * way_x, y + way_y]))
                 axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(along[-1] - along[0]))))
         self._draw_axis(axes, frame, x, y)
 
     def _colour(self, section, frame, side, largest):
+        """The colours of the points of one side; `largest`: what velocities are relative to."""
         if not self.velocity:
             _, values, colours = self._halves(frame)[side > 0]
             return colours.rgb(section.at(values))
         if frame.u_n is None:
             return np.full((section.x.size, 3), 0.7)
-        relative = section.at(frame.u_n) / largest if largest else np.zeros(section.x.size)
-        return plt.get_cmap(VELOCITY)(0.5 + relative / 2)[:, :3]
-
-    def bars(self):
-        return 1 + any(frame.u_t is not None for frame in self.shapes) if self.velocity else super().bars()
-
-    def draw_colour_bars(self, figure, bottom):
-        if not self.velocity:
-            super().draw_colour_bars(figure, bottom)
-            return
-        what = "run" if self.motions[0].by_run else "shape"
-        room = style.slots(self.bars())
-        left, width, line = room[0]
-        draw_bar(figure, bottom + line * BAR_HEIGHT, left, width, ScalarMappable(Normalize(-1, 1), VELOCITY),
-                 f"normal velocity {SYMBOLS['u_n']} / max |{SYMBOLS['u_n']}| of the {what}, > 0: outward")  # fmt: skip
-        if len(room) > 1:
-            words = f"velocity {SYMBOLS['u_t']} along the profile;\nthis long: max |{SYMBOLS['u_t']}| of the {what}"
-            left, _, line = room[-1]
-            draw_arrow_key(figure, left, bottom + line * BAR_HEIGHT, words)
+        return self.colours[0].rgb(section.at(frame.u_n) / (largest or np.inf))

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
 from . import style
-from .labels import formula, in_unit, number, symbol
+from .labels import formula, in_unit, number
 from .style import DASHES, MARKERS, Legend, axes_at, few_ticks, line_colours, time_name, time_text
 
 STOP_MARK = {"color": "crimson", "marker": "x", "linestyle": "", "markersize": 6, "markeredgewidth": 1.6}
@@ -291,8 +291,8 @@ class BranchPanel:
             if result.stopped_early:
                 axes.plot(x[-1], y[-1], clip_on=False, zorder=5, **STOP_MARK)
         few_ticks(axes.xaxis, axes.get_position().width * style.WIDTH)
-        keys = {result.case.get("equilibrium", {}).get("branch", {}).get("vary") for result in self.results}
-        name = symbol(keys.pop().split(".")[-1]).replace("_", " ") if len(keys) == 1 and None not in keys else "parameter of the branch"
+        keys = {result.vary for result in self.results}
+        name = self.results[0].parameter_name if len(keys) == 1 and "" not in keys else "parameter of the branch"
         along = all("parameter" in result.series for result in self.results)
         unit = self.results[0].parameter_unit if len({result.parameter_unit for result in self.results}) == 1 else ""
         axes.set_xlabel(in_unit(name, unit) if along else "number of the shape", labelpad=2)

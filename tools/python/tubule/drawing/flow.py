@@ -10,7 +10,7 @@ LONGEST_ARROW, SHORTEST_ARROW = 0.17, 0.035  # inches
 STILL = 5e-3  # part of the largest speed of a run below which a shape is drawn as at rest
 ROUNDING = 1e-6  # lengths per unit of time: speeds of an initial shape that does not move
 VELOCITY = "RdBu_r"
-SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8"}
+SYMBOLS = {"u_n": "u\u2099", "u_t": "u\u209c", "u_theta": "u\u03b8", "H0": "H\u2080", "energy_density": "f"}
 SPACING = 0.15  # inches between arrows on a surface
 STEEPEST = 0.3  # smallest cosine between the normal and the eye that has arrows
 
@@ -34,8 +34,8 @@ def draw_arrow_key(figure, left, bottom, words):
 class Motion:
     """Speeds of the shapes of one result, for quantities relative to the largest value on each shape or, `by_run`, of all."""
 
-    def __init__(self, shapes, unit="", rate=1.0):
-        self.shapes, self.by_run = shapes, False
+    def __init__(self, shapes, unit="", rate=1.0, by_run=False):
+        self.shapes, self.by_run = shapes, by_run
         self.unit, self.rounding = unit, ROUNDING * rate  # of speeds; `rate`: of one length per unit of time of the case
         self.fastest = max((shape.speed for shape in shapes), default=0.0)
 
@@ -58,6 +58,15 @@ class Motion:
             found = {"u": shape.speed}
         lines = (f"|{SYMBOLS.get(name, name)}| \u2264 {power(value, 2)} {self.unit}".rstrip() for name, value in found.items() if value)
         return "\n".join(lines) or "at rest"
+
+
+def motions_of(results, frames_of, by_run):
+    """The motion to which each shape belongs, by the id of the shape."""
+    motions = {}
+    for result in results:
+        motion = Motion(frames_of(result), result.unit("length/time"), result.scale("1/time"), by_run)
+        motions |= {id(shape): motion for shape in motion.shapes}
+    return motions
 
 
 def surface_arrows(samples, velocity, spacing):

@@ -8,13 +8,12 @@ import time
 
 import numpy as np
 from matplotlib.animation import FFMpegWriter, PillowWriter
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 from . import raster
 from .colours import colours_of, draw_bar
 from .command_line import Unavailable, say
-from .labels import in_unit, symbol
+from .labels import in_unit
 from .results import BadInput, Surface
 from .style import draw_scale_bar, few_ticks, line_colours, time_text
 from .surfaces import node_areas
@@ -80,8 +79,7 @@ class Stage:
         self._draw_energy()
 
     def _draw_shape_axes(self):
-        mappable = ScalarMappable(self.colours.norm, self.colours.map)
-        draw_bar(self.figure, 0.1, 0.06, 0.44, mappable, self.colours.label, self.colours.extend)
+        draw_bar(self.figure, 0.1, (0.06, 0.44, 0), self.colours)
         axes = self.figure.add_axes([0, 0, 1, 1])
         axes.set(xlim=(0, SIZE[0]), ylim=(0, SIZE[1]))
         axes.axis("off")
@@ -103,8 +101,7 @@ class Stage:
         parameter = self.frames[0].parameter is not None
         series = self.result.series
         self.dot, key = None, "parameter" if parameter and "parameter" in series else "time"
-        vary = self.result.case.get("equilibrium", {}).get("branch", {}).get("vary", "") if parameter else "t"
-        self.name = symbol(vary.split(".")[-1]).replace("_", " ")
+        self.name = self.result.parameter_name if parameter else "t"
         if "energy" not in series or len(series["energy"]) < 2:
             return
         axes = self.figure.add_axes([0.66, 0.17, 0.31, 0.68])

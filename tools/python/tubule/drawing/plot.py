@@ -8,7 +8,6 @@ from operator import attrgetter
 from matplotlib.figure import Figure
 
 from . import command_line, scan, style, units
-from .colours import bars_height
 from .curves import CurvePanel
 from .cuts import CutPanel
 from .energy import BranchPanel, EnergyPanel
@@ -55,7 +54,10 @@ class Page:
             check_quantities(self.results, attrgetter("frames"), self.options.colour if any(frame.u_n is not None for frame in shown) else
                              [name for name in self.options.colour if name != "u_n"])
             graphs = all(frame.is_graph for frame in shown) and names != ["u_n"]
-            yield (TubePanel if graphs else CurvePanel)(self.results, self.labels, columns, names)
+            if graphs:
+                yield TubePanel(self.results, self.labels, columns, names)
+            else:
+                yield CurvePanel(self.results, self.labels, columns, names, self.options.scale == "run")
 
     def surfaces(self):
         shown = [(r, label) for r, label in zip(self.results, self.labels) if r.surfaces]
@@ -65,7 +67,8 @@ class Page:
         columns = choose_columns(results, self.times, attrgetter("surfaces"))
         self.marked = self.marked or [column.time for column in columns if column.time is not None]
         if self.wants("surface"):
-            yield SurfacePanel(results, labels, columns, choose_colours(results, self.options.colour), self.options.camera)
+            names = choose_colours(results, self.options.colour)
+            yield SurfacePanel(results, labels, columns, names, self.options.camera, self.options.scale == "run")
         if "cuts" in self.options.kind or ("all" in self.options.kind and all(r.moves for r in results)):
             yield CutPanel(results, labels, columns, self.options.plane)
 
@@ -116,24 +119,16 @@ def figure_of(results, options):
 
     heading = textwrap.wrap(", ".join(labels[0]), int(style.WIDTH / 0.072)) if len(results) == 1 else []
     title = 0.16 * len(heading) + 0.04 * bool(heading)
-    coloured = [panel for panel in panels if hasattr(panel, "draw_colour_bars")]
-    tall = title + sum(panel.height for panel in panels) + sum(bars_height(panel.bars()) for panel in coloured) + 0.1
-    figure = Figure(figsize=(style.WIDTH, tall))
+    figure = Figure(figsize=(style.WIDTH, title + sum(panel.height for panel in panels) + 0.1))
     top = figure.get_figheight() - 0.05
     if title:
         figure.text(0.5, top / figure.get_figheight(), "\n".join(heading), ha="center", va="top", fontsize=9)
         top -= title
-    for panel in panels if options.scale == "run" else ():
-        if hasattr(panel, "scale_by_run"):
-            panel.scale_by_run()
     for letter, panel in zip("abcde", panels):
+        if len(panels) > 1:
+            figure.text(0.01, top / figure.get_figheight(), f"({letter})", va="top", fontsize=9)
         top -= panel.height
         panel.draw(figure, top)
-        if len(panels) > 1:
-            figure.text(0.01, (top + panel.height) / figure.get_figheight(), f"({letter})", va="top", fontsize=9)
-        if panel in coloured:
-            top -= bars_height(panel.bars())
-            panel.draw_colour_bars(figure, top + 0.08)
     return figure
 
 

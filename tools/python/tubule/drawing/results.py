@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from .command_line import BadInput, check_file
-from .labels import as_label, flatten, pretty_unit
+from .labels import as_label, flatten, pretty_unit, symbol
 from .triangles import join_periods
 
 
@@ -136,6 +136,15 @@ class Result:
     def unit(self, of):
         """The unit of numbers with these dimensions; "" where there is none."""
         return pretty_unit(self.units[of]["unit"]) if of in self.units else ""
+
+    @property
+    def vary(self):
+        """The key that varies along its branch of equilibria, or an empty text."""
+        return self.case.get("equilibrium", {}).get("branch", {}).get("vary", "")
+
+    @property
+    def parameter_name(self):
+        return symbol(self.vary.split(".")[-1]).replace("_", " ") or "parameter"
 
     @property
     def parameter_unit(self):

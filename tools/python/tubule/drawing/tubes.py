@@ -1,14 +1,15 @@
 """Panels of shapes: which frames they show, and their layout. Panel of tubes r(z): left halves coloured by H,
 right ones by K, unless others are asked for."""
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from operator import attrgetter
 
 import numpy as np
 from matplotlib.collections import QuadMesh
 
 from . import style
-from .colours import colours_of, draw_bars
+from .colours import bars_height, colours_of, draw_bars
 from .labels import number, wrapped
 from .results import BadInput
 from .raster import shade
@@ -128,14 +129,17 @@ def ring_areas(frame):
 
 
 class ShapesPanel:
-    """A row of shapes for each result, a column for each time. Sizes everything in inches first, so that the figure can be made
-    to fit; then draws. What a shape covers, how it is drawn and what is written below it is defined by derived classes."""
+    """A row of shapes for each result, a column for each time, bars of their colours below. Sizes everything in inches first, so
+    that the figure can be made to fit; then draws. What a shape covers, how it is drawn, by which scales() of colours, and what
+    is written below it is defined by derived classes."""
 
     MARGIN = 0.0  # inches of margin around a shape
     COLUMN_GAP, LABEL_WIDTH, SLACK = 0.14, 16, 0.5
     MAX_LENGTH, MAX_WIDTH = MAX_HEIGHT, MAX_TUBE_WIDTH  # inches of the largest shape
     BAR = 1 / 2  # of the longest shape
     pictures, copies = 1, 1  # of each shape: above each other, beside each other
+    motions = {}  # by the id of a shape, where its velocity is shown
+    arrow = ""  # what the longest arrow means, if there are any
 
     def __init__(self, results, labels, columns):
         self.results, self.columns = results, columns
@@ -144,7 +148,7 @@ class ShapesPanel:
         self.shapes = [shape for column in columns for shape in column.cells if shape]
         self.left = (0.45 if self.pictures > 1 else 0.2) + 0.062 * max(len(line) for label in self.labels for line in label.split("\n"))
         self.titles = [self._title(index, column) for index, column in enumerate(columns)]
-        self.captions = [[self._words(column, row) for column in columns] for row in range(len(results))]
+        self.captions = [["\n".join(filter(None, self._words(column, row))) for column in columns] for row in range(len(results))]
         below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
 
         sizes = np.array([[self._size(shape) if shape else (0, 0) for shape in column.cells] for column in columns])
@@ -182,6 +186,7 @@ class ShapesPanel:
                 self.middles.append(self.height + tall / 2)
                 self.height += tall + ROW_GAP
             self.height += caption_room
+        self.height += bars_height(len(self.scales()) + bool(self.arrow))
 
     def _title(self, index, column):
         if column.time is not None and all(result.is_equilibrium for result in self.results):
@@ -190,7 +195,9 @@ class ShapesPanel:
 
     def _words(self, column, row):
         """Below the shape of that row and column."""
-        return caption(column, row, self.results[row])
+        shape = column.cells[row]
+        moves = self.motions and shape and shape.u_n is not None
+        return [caption(column, row, self.results[row]), self.motions[id(shape)].words(shape) if moves else ""]
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
@@ -214,6 +221,7 @@ class ShapesPanel:
         right = self.centres[-1] + self.widths[-1] / 2 + self.MARGIN
         low = top - self.middles[-1] - self.scale * self.lengths[-1] / 2
         draw_scale_bar(axes, right + 0.14, low, self.BAR * max(self.lengths), self.scale, self.results[0].unit("length"))
+        draw_bars(figure, bottom + 0.08, self.scales(), self.arrow)
         return axes
 
 
@@ -221,18 +229,18 @@ class ProfilePanel(ShapesPanel):
     """Profiles, coloured by a quantity on the left and another or the same on the right."""
 
     def __init__(self, results, labels, columns, names):
-        super().__init__(results, labels, columns)
-        self.names = names[:2]
         if len(names) > 2:
             raise BadInput("--colour: a profile has two halves, and at most as many colours")
-        self._choose_colours()
+        self.names, frames = names, [frame for column in columns for frame in column.cells if frame]
+        areas = [ring_areas(frame) for frame in frames]
+        self.colours = self._choose_colours(results, frames, areas)
+        super().__init__(results, labels, columns)
 
     def _size(self, frame):
         return 2 * frame.r.max(), frame.length
 
-    def _choose_colours(self):
-        areas = [ring_areas(frame) for frame in self.shapes]
-        self.colours = [colours_of(name, self.results, self.shapes, areas) for name in self.names]
+    def _choose_colours(self, results, frames, areas):
+        return [colours_of(name, results, frames, areas) for name in self.names]
 
     def _halves(self, frame):
         """Side, values and colours of the left and the right half."""
@@ -242,15 +250,12 @@ class ProfilePanel(ShapesPanel):
         reach = 0.5 * self.scale * frame.length + max(0.05, self.MARGIN)
         axes.plot([x, x], [y - reach, y + reach], color="0.1", linewidth=0.4, dashes=(12, 3, 2, 3), zorder=2)
 
-    def bars(self):
-        return len(self.names)
-
-    def draw_colour_bars(self, figure, bottom):
-        """A colour bar for each half."""
-        halves = (" (left halves)", " (right halves)") if len(self.names) > 1 else ("",)
+    def scales(self):
+        if len(self.names) < 2:
+            return self.colours
         # The name, where it is drawn, what is white.
-        labels = ["".join([*words.partition(",")[:1], half, *words.partition(",")[1:]]) for words, half in zip((c.label for c in self.colours), halves)]
-        draw_bars(figure, bottom, list(zip(self.colours, labels)))
+        parts = zip(self.colours, ("left", "right"))
+        return [replace(c, label=re.sub("(,|$)", rf" ({side} halves)\1", c.label, count=1)) for c, side in parts]
 
 
 class TubePanel(ProfilePanel):

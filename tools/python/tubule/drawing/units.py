@@ -38,8 +38,7 @@ def asked(path, option="", sets=()):
 def convert(result, units):
     """Changes all numbers of a result from those of its case to these units. Stationary shapes keep their numbers."""
     result.units = {key: value for key, value in units.items() if key != "time" or not result.is_equilibrium}
-    vary = result.case.get("equilibrium", {}).get("branch", {}).get("vary", "")
-    result.dimensions["parameter"] = OF_KEYS.get(vary, "")
+    result.dimensions["parameter"] = OF_KEYS.get(result.vary, "")
     result.series = {name: values * result.scale(result.dimensions.get(name, "")) for name, values in result.series.items()}
     result.about |= {name: result.about[name] * result.scale(of) for name, of in OF_RUNS.items() if name in result.about}
     for frame in [*result.frames, *result.surfaces]:

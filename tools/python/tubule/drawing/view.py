@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from . import command_line, flow, raster, scan, units
 from .colours import Colours
-from .labels import as_label, flatten, in_unit, symbol
+from .labels import as_label, flatten, in_unit
 from .movie import shared_colours
 from .raster import lattice
 from .results import BadInput, Surface, opened
@@ -26,7 +26,7 @@ from .tubes import choose_columns
 HERE = os.path.dirname(os.path.abspath(__file__))
 STEPS = 65535  # of 16-bit numbers
 # Symbols, and words for those whose colours are not from print.
-SYMBOLS = {"H": "H", "K": "K", **flow.SYMBOLS, "p": "p", "energy_density": "f"}
+SYMBOLS = {name: flow.SYMBOLS.get(name, name) for name in ("H", "K", "u_n", "u_t", "u_theta", "p", "energy_density")}
 WORDS = {
     "u_n": "normal velocity u\u2099, > 0: outward",
     "u_t": "velocity along the profile",
@@ -153,7 +153,6 @@ def run_page(result):
     shapes = [Shape(frame) for frame in frames]
     fields = described_fields(shapes, result, [column.cells[0] for column in columns])
     along = "parameter" if result.is_equilibrium and "parameter" in result.series else "time"
-    vary = result.case.get("equilibrium", {}).get("branch", {}).get("vary", along)
     about, warnings = ending(result.about)
     return {
         "kind": "shapes",
@@ -163,7 +162,7 @@ def run_page(result):
         "about": about,
         "warnings": warnings,
         "along": along,
-        "along_words": symbol(vary.split(".")[-1]).replace("_", " ") if along == "parameter" else along,
+        "along_words": result.parameter_name if along == "parameter" else along,
         "series": {name: finite(values) for name, values in result.series.items() if name != "wall_seconds"},
         "meanings": result.meanings,
         "units": {name: unit for name, of in result.dimensions.items() if (unit := result.unit(of))},
