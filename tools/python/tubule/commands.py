@@ -242,7 +242,6 @@ def export(what: Result | Frame, output: str | os.PathLike, *, frame: int = -1, 
     if not isinstance(what, (Frame, Result)):
         raise TypeError(f"a result or a frame is wanted, not {reprlib.repr(what)}")
     try:
-        formats.check_output(file_name(output))
         formats.write(file_name(output), *(what.frames[frame] if isinstance(what, Result) else what).triangles(subdivide))
     except command_line.BadInput as error:
         raise ValueError(str(error)) from None

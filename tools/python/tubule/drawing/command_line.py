@@ -33,52 +33,39 @@ class Help(Exception):
 # ---- the value of an option: functions from its text, which raise ArgumentTypeError
 
 
-def number(low=-math.inf, high=math.inf):
-    def parse(text):
+def value(parse, words):
+    """That of parse(text), which raises ValueError or TypeError for what is none; then `words` say so of the text, {}."""
+
+    def parsed(text):
         try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise argparse.ArgumentTypeError(f"{text} is not a finite number")
-        if not low <= value <= high:
+            return parse(text)
+        except (ValueError, TypeError, argparse.ArgumentTypeError):
+            raise argparse.ArgumentTypeError(words.format(text)) from None
+
+    return parsed
+
+
+def finite(text):
+    if not math.isfinite(float(text)):
+        raise ValueError(text)
+    return float(text)
+
+
+def number(low=-math.inf, high=math.inf, parse=value(finite, "{} is not a finite number")):
+    def parsed(text):
+        if not low <= parse(text) <= high:
             raise argparse.ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
-        return value
+        return parse(text)
 
-    return parse
-
-
-def integer(text):
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text} is not an integer") from None
-
-
-def pieces(text):
-    if not 1 <= integer(text) <= 64:
-        raise argparse.ArgumentTypeError(f"{text} is not between 1 and 64")
-    return int(text)
+    return parsed
 
 
 def listed(parse):
     return lambda text: [parse(one) for one in text.split(",") if one]
 
 
-def time(text):
-    try:
-        return math.inf if text == "end" else number()(text)
-    except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list of numbers t1,t2,... or end") from None
-
-
 def one_of(words):
-    def parse(text):
-        if text not in words:
-            raise argparse.ArgumentTypeError(f"{text!r} is not one of {', '.join(words)}")
-        return text
-
-    return parse
+    return value(lambda text: words[words.index(text)], f"{{!r}} is not one of {', '.join(words)}")
 
 
 def colour(text):
@@ -91,26 +78,27 @@ def file_name(text):
     return text
 
 
-def plane(text):
+def position(text):
     found = PLANE.fullmatch(text)
-    try:
-        return found[1], number()(found[2])
-    except (TypeError, argparse.ArgumentTypeError):
-        raise argparse.ArgumentTypeError(f"'{text}' is not x, y or z = number, such as z=0") from None
+    return found[1], finite(found[2])
 
 
-def camera(text):
-    try:
-        azimuth, elevation = text.split(",")
-        return number(-360, 360)(azimuth), number(-90, 90)(elevation)
-    except (ValueError, argparse.ArgumentTypeError):
-        raise argparse.ArgumentTypeError(f"'{text}' is not AZIMUTH,ELEVATION in degrees, up to 360 and 90, such as -37,22") from None
+def angles(text):
+    azimuth, elevation = text.split(",")
+    return number(-360, 360)(azimuth), number(-90, 90)(elevation)
 
 
-def units(text):
+def changes(text):
     if text not in ("", "none") and not all("=" in part for part in text.split(",")):
-        raise argparse.ArgumentTypeError(f"'{text}' is neither none nor key=value,..., as in length=50 nm,bending_rigidity=20 kT")
+        raise ValueError(text)
     return text
+
+
+integer = value(int, "{} is not an integer")
+time = value(lambda text: math.inf if text == "end" else finite(text), "'{}' is not a list of numbers t1,t2,... or end")
+plane = value(position, "'{}' is not x, y or z = number, such as z=0")
+camera = value(angles, "'{}' is not AZIMUTH,ELEVATION in degrees, up to 360 and 90, such as -37,22")
+units = value(changes, "'{}' is neither none nor key=value,..., as in length=50 nm,bending_rigidity=20 kT")
 
 
 # ---- the commands
@@ -260,7 +248,7 @@ def export():
     parser.option("-o", "--output", type=file_name, action="append", required=True,
                   help="file to write, .stl (binary), .ply (binary, double precision) or .obj; may be repeated")  # fmt: skip
     parser.option("--frame", type=integer, metavar="INT", default="-1", help="which shape, counted from 0, or from -1 backwards")
-    parser.option("--subdivide", type=pieces, metavar="INT",
+    parser.option("--subdivide", type=number(1, 64, integer), metavar="INT",
                   help="n: a curved triangle becomes n^2 flat ones, a profile is revolved with 24 n points around its widest circle "
                        "(default: the degree of the triangles; 4)")  # fmt: skip
     return parser
@@ -364,6 +352,15 @@ def check_file(path):
     if path.endswith(".toml"):
         raise BadInput(f"{path}: is a case file, not a result: run it first (tubule run {path}; tubule scan for a scan), then give "
                        f"its result, {os.path.basename(path)[:-5]}.hdf")  # fmt: skip
+
+
+def check_output(path, formats, what):
+    """Raises BadInput, before any work, for a file that cannot be written, "a picture is", say."""
+    if os.path.splitext(path)[1].lower() not in formats:
+        raise BadInput(f"{path}: {what} written as one of {', '.join(formats)}")
+    folder = os.path.dirname(path) or "."
+    if not os.path.isdir(folder):
+        raise BadInput(f"{path}: the folder {folder} does not exist")
 
 
 def require_libraries(program):

@@ -38,11 +38,7 @@ def monotone_cubic(x, y, points):
     slope[1:-1] = np.where(same_sign, (w1 + w2) / (w1 / safe[1] + w2 / safe[0]), 0)
     i = np.clip(np.searchsorted(x, points, side="right") - 1, 0, x.size - 2)
     t = (points - x[i]) / step[i]
-    return (
-        y[i]
-        + rise[i] * t * t * (3 - 2 * t)
-        + step[i] * t * (1 - t) * (slope[i] * (1 - t) - slope[i + 1] * t)
-    )
+    return y[i] + rise[i] * t * t * (3 - 2 * t) + step[i] * t * (1 - t) * (slope[i] * (1 - t) - slope[i + 1] * t)
 
 
 def _end_slope(step, secant):
@@ -131,53 +127,42 @@ class EnergyPanel:
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        self.every = list(zip(self.results, self.colours, MARKERS * len(self.results)))
-        left, wide, gap = 0.6, figure.get_figwidth() - 0.7 - (self.legend.right or 0.1), 0.3
-        low = bottom + self.legend.below + 0.38
+        every = list(zip(self.results, self.colours, MARKERS * len(self.results)))
         decades = self.logx or (self.low is None and self.settled < 0.01 * self.end)
         start = self.low if self.low is not None else self._first_time() if decades else 0.0
-        initial = min((t for t in self.times if t >= self.settled), default=self.settled) * 1.03
-        split = not decades and self.low is None and initial < 0.3 * self.end
-        if self.apart:
-            axes = self._draw_apart(figure, left, low, wide, start, decades)
-        elif split and not self.kinetic and not style.is_narrow():
-            half = (wide - gap) / 2
-            axes = [axes_at(figure, left, low, half, HEIGHT)]
-            axes.append(axes_at(figure, left + half + gap, low, half, HEIGHT, sharey=axes[0]))
-            axes[1].tick_params(labelleft=False)
-            self._lines(axes[0], 0, initial, False)
-            self._lines(axes[1], 0, self.end, False)
-            axes[0].set_xlabel(in_unit("time t (initial phase)", self.time_unit), labelpad=2)
-            axes[1].set_xlabel(in_unit("time t (whole run)", self.time_unit), labelpad=2)
-        else:
-            axes = [axes_at(figure, left, low, wide, HEIGHT)]
-            self._lines(axes[0], start, self.end, decades)
-            axes[0].set_xlabel(in_unit("time t", self.time_unit), labelpad=2)
-            if split:
-                self._draw_inset(axes[0], self.every, initial)
-        name = in_unit("energy" if self.kinetic else "bending energy E", self.results[0].unit("energy"))
-        name = relative_ticks(axes[0].yaxis, name)
-        for one in axes if self.rows > 1 else axes[:1]:
-            one.set_ylabel(name, labelpad=3)
-        self.legend.draw(axes[-1], bottom)
-
-    def _draw_apart(self, figure, left, low, wide, start, decades):
-        """The axes of one result each, the first at the top or on the left."""
-        count, gap, drawn = len(self.results), 0.12, []
-        first = min(map(settling_time, self.results))
-        for k, (one, label) in enumerate(zip(self.every, self.labels)):
-            size = wide if self.rows > 1 else (wide - gap * (count - 1)) / count
-            x, y = (left, low + (count - 1 - k) * (HEIGHT + ROOM)) if self.rows > 1 else (left + k * (size + gap), low)
-            axes = axes_at(figure, x, y, size, HEIGHT, sharey=drawn[0] if drawn else None)
-            axes.tick_params(labelleft=self.rows > 1 or k == 0)
-            self._lines(axes, start, self.end, decades, [one])
-            axes.set_xlabel(in_unit("time t", self.time_unit), labelpad=2)
-            axes.set_title(label, pad=11)
+        settled = min(map(settling_time, self.results)) if self.apart else self.settled
+        initial = settled if self.apart else min((t for t in self.times if t >= settled), default=settled) * 1.03
+        enlarged = not decades and self.low is None and initial < 0.3 * self.end  # the initial phase
+        beside = enlarged and not self.kinetic and not style.is_narrow()  # not as an inset
+        # What is drawn in which axes: lines, end of time, words of that, title
+        parts = [(every, self.end, "", "")]
+        if beside:
+            parts = [(every, initial, " (initial phase)", ""), (every, self.end, " (whole run)", "")]
+        elif self.apart:
+            parts = [([one], self.end, "", label) for one, label in zip(every, self.labels)]
+        drawn = []
+        for place, (some, end, words, title) in zip(self._places(figure, bottom, len(parts), 0.3 if beside else 0.12), parts):
+            axes = axes_at(figure, *place, sharey=drawn[0] if drawn else None)
+            axes.tick_params(labelleft=self.rows > 1 or not drawn)
+            self._lines(axes, start, end, decades, some)
+            axes.set_xlabel(in_unit(f"time t{words}", self.time_unit), labelpad=2)
+            axes.set_title(title, pad=11)
             drawn.append(axes)
-        for axes, one in zip(drawn, self.every):  # when the common range of energies is known
-            if not decades and self.low is None and first < 0.3 * self.end:
-                self._draw_inset(axes, [one], first)
-        return drawn
+        for axes, (some, *_) in zip(drawn, parts) if enlarged and not beside else ():  # with the range of all energies known
+            self._draw_inset(axes, some, initial)
+        name = in_unit("energy" if self.kinetic else "bending energy E", self.results[0].unit("energy"))
+        name = relative_ticks(drawn[0].yaxis, name)
+        for axes in drawn if self.rows > 1 else drawn[:1]:
+            axes.set_ylabel(name, labelpad=3)
+        self.legend.draw(drawn[-1], bottom)
+
+    def _places(self, figure, bottom, count, gap):
+        """Places of so many axes, in inches: the first at the top or on the left."""
+        left, low, wide = 0.6, bottom + self.legend.below + 0.38, figure.get_figwidth() - 0.7 - (self.legend.right or 0.1)
+        if self.rows > 1:
+            return [(left, low + (count - 1 - k) * (HEIGHT + ROOM), wide, HEIGHT) for k in range(count)]
+        size = (wide - gap * (count - 1)) / count
+        return [(left + k * (size + gap), low, size, HEIGHT) for k in range(count)]
 
     def _draw_inset(self, axes, some, end):
         inset = axes.inset_axes(INSET)
@@ -193,18 +178,18 @@ class EnergyPanel:
         positive = [time for time in self.times if time > 0] + steps
         return max(min(positive) / 3, 1e-6 * self.end)
 
-    def _lines(self, axes, start, end, log, some=None, named=True):
+    def _lines(self, axes, start, end, log, some, named=True):
         if log:
             axes.set_xscale("log")
         axes.set_xlim(start, end if log else end + 0.02 * (end - start))
         if not log:
             few_ticks(axes.xaxis, axes.get_position().width * style.WIDTH, 0.4)
         grid = (np.geomspace if log else np.linspace)(start, end, 500)
-        for one in some or self.every:
-            self._lines_of_result(axes, one[0], grid, *one[1:])
+        for one in some:
+            self._lines_of_result(axes, grid, *one)
         self._mark_times(axes, start, end, named)
 
-    def _lines_of_result(self, axes, result, grid, colour, marker):
+    def _lines_of_result(self, axes, grid, result, colour, marker):
         time, start, end = result.series["time"], grid[0], grid[-1]
         grid = np.union1d(grid[(grid >= time[0]) & (grid <= time[-1])], time[(time >= start) & (time <= end)])
 

@@ -15,7 +15,7 @@ def triangles_of(shape, subdivide=None):
 
 def main(options):
     for path in options.output:
-        formats.check_output(path)
+        command_line.check_output(path, formats.FORMATS, "triangles are")
     found = triangles_of(read_frame(options.result, options.frame), options.subdivide)
     for path in options.output:
         formats.write(path, *found)

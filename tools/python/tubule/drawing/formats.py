@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-from .command_line import BadInput
+from .command_line import BadInput, check_output
 
 
 def stl(points, corners):
@@ -35,17 +35,9 @@ def obj(points, corners):
 FORMATS = {".stl": stl, ".ply": ply, ".obj": obj}
 
 
-def check_output(path):
-    """Raises BadInput for the name of no such file."""
-    if os.path.splitext(path)[1].lower() not in FORMATS:
-        raise BadInput(f"{path}: triangles are written as one of {', '.join(FORMATS)}")
-    if not os.path.isdir(os.path.dirname(path) or "."):
-        raise BadInput(f"{path}: the folder {os.path.dirname(path)} does not exist")
-
-
 def write(path, points, corners):
     """A file of that name is replaced."""
-    check_output(path)
+    check_output(path, FORMATS, "triangles are")
     try:
         with open(path, "wb") as file:
             file.write(FORMATS[os.path.splitext(path)[1].lower()](points, corners))

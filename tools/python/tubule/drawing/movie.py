@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from . import raster
 from .colours import colours_of, draw_bar
-from .command_line import Unavailable, say
+from .command_line import Unavailable, check_output, say
 from .labels import in_unit
 from .results import BadInput, Surface
 from .style import draw_scale_bar, few_ticks, line_colours, time_text
@@ -38,21 +38,19 @@ def as_surface(frame, name):
     way = np.column_stack([np.gradient(z), -np.gradient(r)])  # outward is to the right of the profile
     way /= np.linalg.norm(way, axis=1, keepdims=True) + 1e-300
     angle = np.linspace(0, 2 * np.pi, AROUND + 1)
-    cos, sin = np.cos(angle), np.sin(angle)
+    node = np.arange(r.size * angle.size).reshape(r.size, angle.size)
+    a, b, c, d = node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]
+    cells = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
-    def grid(radial, axial):
-        return np.stack([np.outer(radial, cos), np.outer(radial, sin), np.outer(axial, np.ones_like(angle))], axis=-1)
-
-    def triangles(nodes):
-        a, b, c, d = nodes[:-1, :-1], nodes[:-1, 1:], nodes[1:, 1:], nodes[1:, :-1]
-        pieces = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
-        return pieces.reshape(-1, 3, *nodes.shape[2:])
+    def turned(radial, axial):
+        """Vectors at the nodes of the cells."""
+        around = np.stack([np.outer(radial, np.cos(angle)), np.outer(radial, np.sin(angle)), np.outer(axial, np.ones(angle.size))], axis=-1)
+        return around.reshape(-1, 3)[cells]
 
     poles = max(frame.r[0], frame.r[-1]) < 1e-6 * frame.r.max()
     ring = np.hypot(frame.r[0] - frame.r[-1], frame.z[0] - frame.z[-1]) < 1e-6 * frame.r.max()  # a torus
-    values_there = np.broadcast_to(v[:, None], (v.size, angle.size))
-    there = triangles(values_there)
-    return Surface(frame.time, 1, bool(poles or ring), triangles(grid(r, z)), triangles(grid(*way.T)), **{"H": there, "K": there, name: there})
+    there = np.repeat(v, angle.size)[cells]
+    return Surface(frame.time, 1, bool(poles or ring), turned(r, z), turned(*way.T), **{"H": there, "K": there, name: there})
 
 
 def shared_colours(result, frames, name):
@@ -150,12 +148,8 @@ class Progress:
 
 
 def writer_for(path, fps):
-    ending = os.path.splitext(path)[1].lower()
-    if ending not in FORMATS:
-        raise BadInput(f"{path}: a film is written as one of {', '.join(FORMATS)}")
-    if not os.path.isdir(os.path.dirname(path) or "."):
-        raise BadInput(f"{path}: the folder {os.path.dirname(path)} does not exist")
-    if ending == ".gif":
+    check_output(path, FORMATS, "a film is")
+    if path.lower().endswith(".gif"):
         return PillowWriter(fps=fps)
     if not shutil.which("ffmpeg"):
         raise Unavailable(f"{path}: needs ffmpeg; install the package ffmpeg, or write a .gif")

@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from .command_line import check_output
 from .labels import formula, number
 from .results import BadInput
 
@@ -148,11 +149,7 @@ def draw_scale_bar(axes, x, y, length, scale, unit=""):
 def check_outputs(paths):
     """Raises BadInput, before any work, for a picture that cannot be written."""
     for path in paths:
-        if os.path.splitext(path)[1].lower() not in FORMATS:
-            raise BadInput(f"{path}: a picture is written as one of {', '.join(FORMATS)}")
-        folder = os.path.dirname(path) or "."
-        if not os.path.isdir(folder):
-            raise BadInput(f"{path}: the folder {folder} does not exist")
+        check_output(path, FORMATS, "a picture is")
 
 
 def save(figure, paths):
