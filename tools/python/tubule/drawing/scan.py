@@ -1,6 +1,7 @@
 """Maps of scans: the outcome of each point, the boundaries between outcomes, and closed forms."""
 
 import json
+import math
 import os
 import re
 import textwrap
@@ -42,33 +43,28 @@ VERDICTS = {
     "other-outcome": {"marker": "X", "color": "black", "markersize": 6},
     "no-answer": {"marker": "$?$", "color": "black", "markersize": 6},
 }
-# What can be drawn of points, and how it is called.
+# What can be drawn of points: how it is called, and its dimensions.
 QUANTITIES = {
-    "outcome": "outcome",
-    "energy": "energy where the run stopped",
-    "time": "time where the run stopped",
-    "energy_error": "estimated error of the energy / " + formula("E_{ref}"),
-    "E_ref": formula("E_{ref}"),
-    "r_min": "smallest radius",
-    "r_max": "largest radius",
-    "area": "area",
-    "volume": "volume",
-    "height": "height",
-    "tension": "tension",
-    "pressure": "pressure",
-    "growth": "largest growth rate",
-    "free_energy": "free energy F",
-    "limit_energy": "energy of the vesiculated limit",
-    "steps": "steps",
-    "elements": "elements",
-    "wall_seconds": "wall time in s",
-    "cpu_seconds": "CPU time in s",
+    "outcome": ("outcome", ""),
+    "energy": ("energy where the run stopped", "energy"),
+    "time": ("time where the run stopped", "time"),
+    "energy_error": ("estimated error of the energy / " + formula("E_{ref}"), ""),
+    "E_ref": (formula("E_{ref}"), "energy"),
+    "r_min": ("smallest radius", "length"),
+    "r_max": ("largest radius", "length"),
+    "area": ("area", "length^2"),
+    "volume": ("volume", "length^3"),
+    "height": ("height", "length"),
+    "tension": ("tension", "energy/length^2"),
+    "pressure": ("pressure", "energy/length^3"),
+    "growth": ("largest growth rate", "1/time"),
+    "free_energy": ("free energy F", "energy"),
+    "limit_energy": ("energy of the vesiculated limit", "energy"),
+    "steps": ("steps", ""),
+    "elements": ("elements", ""),
+    "wall_seconds": ("wall time in s", ""),
+    "cpu_seconds": ("CPU time in s", ""),
 }
-OF_POINTS = {
-    "energy": "energy", "time": "time", "E_ref": "energy", "r_min": "length", "r_max": "length", "area": "length^2",
-    "volume": "length^3", "height": "length", "tension": "energy/length^2", "pressure": "energy/length^3", "growth": "1/time",
-    "free_energy": "energy", "limit_energy": "energy",
-}  # fmt: skip
 UNITS_CHANGE = re.compile(r"(energy\.k20|model\.(kind|Re|gamma)|units\.\w+)=")  # keys that decide what a number stands for
 AT_REST = ("uniform-tube", "unduloid", "sphere", "closed", "prolate", "oblate", "stomatocyte", "pear")
 KNOWN_OF_FAILED = 1e-4  # of E_ref: to this the energy where a search failed is known
@@ -138,23 +134,18 @@ class Axis:
 
     def place(self, value):
         """The place of a value on the axis, given as text; None if it has no such value."""
-        if value in self.texts:
-            return self.texts.index(value)
-        try:
-            number = float(value)
-        except ValueError:
-            return None
-        near = np.flatnonzero(np.isclose(self.values, number * self.scale, rtol=1e-9, atol=0)) if self.is_numeric else []
-        return int(near[0]) if len(near) else None
+        if self.is_numeric and value not in self.texts:
+            try:
+                value = next((text for text in self.texts if math.isclose(float(text), float(value), rel_tol=1e-9)), None)
+            except ValueError:
+                return None
+        return self.texts.index(value) if value in self.texts else None
 
     def borders(self):
         """Midpoints between the values, and as far beyond the first and last."""
         v = np.log(self.values) if self.logarithmic else self.values
-        if v.size == 1:
-            borders = np.array([v[0] - 0.5, v[0] + 0.5])
-        else:
-            middle = (v[1:] + v[:-1]) / 2
-            borders = np.concatenate([[2 * v[0] - middle[0]], middle, [2 * v[-1] - middle[-1]]])
+        middle = (v[1:] + v[:-1]) / 2 if v.size > 1 else v + 0.5
+        borders = np.concatenate([[2 * v[0] - middle[0]], middle, [2 * v[-1] - middle[-1]] if v.size > 1 else []])
         return np.exp(borders) if self.logarithmic else borders
 
     def mark(self, axis):
@@ -214,7 +205,7 @@ class Scan:
         for axis in self.axes:
             axis.unit, axis.scale = self.unit_of_key(axis.key)
             axis.values = axis.values * axis.scale if axis.is_numeric else axis.values
-        self.points |= {name: self.points[name] * self.unit_of(name)[1] for name in OF_POINTS if name in self.points}
+        self.points |= {name: data * self.unit_of(name)[1] for name, data in self.points.items() if self.unit_of(name)[0]}
         return self
 
     def unit_of_key(self, key):
@@ -223,11 +214,11 @@ class Scan:
         return self.units.get("length" if amplitude else units.OF_KEYS.get(key), ("", 1.0))
 
     def unit_of(self, quantity):
-        """Likewise of what QUANTITIES lists."""
-        return self.units.get(OF_POINTS.get(quantity), ("", 1.0))
+        """Likewise of values of points."""
+        return self.units.get(QUANTITIES.get(quantity, ("", ""))[1], ("", 1.0))
 
     def label(self, quantity):
-        return in_unit(QUANTITIES.get(quantity, quantity), self.unit_of(quantity)[0])
+        return in_unit(QUANTITIES.get(quantity, (quantity,))[0], self.unit_of(quantity)[0])
 
     def caption(self):
         """What all points have in common and the title need not say: moduli that are not zero, sizes, loads."""
@@ -264,21 +255,22 @@ class Scan:
         index = tuple(places.get(i, slice(None)) for i in range(len(self.axes)))
         return {name: data[index] for name, data in self.points.items()}
 
+    def at_rest(self, outcome):
+        """Where outcomes are stationary shapes."""
+        return np.isin(outcome, [k for k, name in enumerate(self.names) if name in AT_REST])
+
     def best_starts(self):
         """For each point the initial shape that leads to the least energy, the first one where none leads to a shape."""
-        at_rest = np.isin(self.points["outcome"], [k for k, name in enumerate(self.names) if name in AT_REST])
-        return np.argmin(np.where(at_rest, self.points["free_energy"], np.inf), axis=self.starts, keepdims=True)
+        energy = np.where(self.at_rest(self.points["outcome"]), self.points["free_energy"], np.inf)
+        return np.argmin(energy, axis=self.starts, keepdims=True)
 
 
 def differing(outcome):
     """Pairs of neighbours whose outcomes differ, by their numbers."""
-    number = np.arange(outcome.size).reshape(outcome.shape)
-    pairs = []
     for axis in range(outcome.ndim):
-        (a, b), (k, l) = ((np.delete(array, -1, axis), np.delete(array, 0, axis)) for array in (outcome, number))
-        differ = (a != b) & (a > 0) & (b > 0)
-        pairs += zip(k[differ], l[differ])
-    return pairs
+        pairs = np.stack([np.delete(np.arange(outcome.size).reshape(outcome.shape), end, axis).ravel() for end in (-1, 0)], axis=1)
+        a, b = outcome.ravel()[pairs].T
+        yield from pairs[(a != b) & (a > 0) & (b > 0)]
 
 
 def is_lower(energy, than):
@@ -311,22 +303,21 @@ class Slice:
             self.points = {name: np.take_along_axis(data, best_of, starts)[index] for name, data in scan.points.items()}
         else:
             self.points = scan.at(cut)
-        self._lower_states()
+        self._lower_states(scan)
         self.thresholds = [] if set(cut) - {starts} else scan.thresholds
         if starts is None:
             self._boundary(scan, cut, kept)
         else:
-            self.boundary = differing(self.points["outcome"])
+            self.boundary = [*differing(self.points["outcome"])]
         self.caption = scan.caption()
         where = ", ".join(scan.axes[i].words(place) for i, place in sorted(cut.items()))
         self.title = ": ".join(words for words in (scan.title, where) if words)
         self.label = scan.label
 
-    def _lower_states(self):
+    def _lower_states(self, scan):
         """Where spheres joined by points have less energy than any smooth shape found; and where the lowest state is not
         known, since a search that failed had come to less, or nothing at all was found."""
-        at_rest = [k for k, name in enumerate(self.names) if name in AT_REST]
-        found = np.isin(self.points["outcome"], at_rest)
+        found = scan.at_rest(self.points["outcome"])
         self.vesiculated = self.unreached = np.zeros(found.shape, bool)
         if not self.all_starts:
             return
@@ -335,7 +326,7 @@ class Slice:
         lower = is_lower(limit, least)
         unreached = (self.points["outcome"] > 0) & ~found & ~lower
         for points in self.all_starts:
-            failed = (points["outcome"] > 0) & ~np.isin(points["outcome"], at_rest)
+            failed = (points["outcome"] > 0) & ~scan.at_rest(points["outcome"])
             unreached |= failed & is_lower(points["free_energy"] + KNOWN_OF_FAILED * points["E_ref"], np.where(lower, limit, least))
         self.vesiculated, self.unreached = lower & ~unreached, unreached
 
@@ -358,6 +349,10 @@ class Slice:
     @property
     def shape(self):
         return self.points["outcome"].shape
+
+    def plain_outcomes(self):
+        """0 where cells are hatched, or nothing is known."""
+        return np.where(self.vesiculated | self.unreached, 0, self.points["outcome"])
 
 
 def draw_borders(part, panel):
@@ -413,7 +408,7 @@ def draw_hatches(part, panel):
 def draw_cells(part, quantity, panel):
     """The colour of each point's cell."""
     if quantity == "outcome":
-        shown = np.ma.masked_where((part.points["outcome"] == 0) | part.vesiculated | part.unreached, part.points["outcome"].astype(float))
+        shown = np.ma.masked_equal(part.plain_outcomes(), 0).astype(float)
         look = {"cmap": ListedColormap([COLOURS.get(name, "#ffffff") for name in part.names]),
                 "norm": BoundaryNorm(np.arange(-0.5, len(part.names)), len(part.names))}  # fmt: skip
     else:
@@ -484,11 +479,9 @@ def figure_of(scan, quantity="", slices=(), confirmed=None):
         raise BadInput(f"--quantity {quantity}: must be one of {', '.join(QUANTITIES)}")
     is_map = len(part.axes) == 2
     of_outcomes = not is_map or quantity in ("", "outcome")
-    patches = [
-        Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count})")
-        for k, name in enumerate(part.names)
-        if of_outcomes and k > 0 and (count := int(((part.points["outcome"] == k) & ~part.vesiculated & ~part.unreached).sum()))
-    ]
+    count = np.bincount(part.plain_outcomes().ravel(), minlength=len(part.names))
+    patches = [Patch(facecolor=COLOURS.get(name, "#ffffff"), edgecolor="0.3", linewidth=0.4, label=f"{name} ({count[k]})")
+               for k, name in enumerate(part.names) if of_outcomes and k > 0 and count[k]]  # fmt: skip
     if confirmed and (not is_map or slices):
         raise BadInput(f"{path}: --confirmed marks points of a scan of two axes, without --slice")
     figure = Figure(figsize=(style.WIDTH, PANEL))
