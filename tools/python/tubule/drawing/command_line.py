@@ -386,9 +386,10 @@ def run(draw, outputs, name=None):
 
 
 def main(description, draw, argument="table", nargs=None):
-    """Calls draw(argument, outputs) with what the command line gives."""
+    """Calls draw(argument, outputs) with what the command line gives, and prints the pictures where there is an argument."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(argument, nargs=nargs)
+    if argument:
+        parser.add_argument(argument, nargs=nargs)
     parser.add_argument("-o", "--output", action="append", required=True)
     options = parser.parse_args()
-    return run(lambda outputs: draw(getattr(options, argument), outputs), options.output, os.path.relpath)
+    return run(lambda outputs: draw(argument and getattr(options, argument), outputs), options.output, argument and os.path.relpath)

@@ -1,6 +1,5 @@
 """Draws dispersion relations of a tube, with their thresholds, from the JSON of `tubule stability`."""
 
-import argparse
 import json
 import math
 import sys
@@ -109,7 +108,4 @@ def draw(data, outputs):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", action="append", required=True)
-    options = parser.parse_args()
-    return command_line.run(lambda outputs: draw(json.load(sys.stdin), outputs), options.output)
+    return command_line.main(__doc__, lambda _, outputs: draw(json.load(sys.stdin), outputs), None)

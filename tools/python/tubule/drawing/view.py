@@ -19,7 +19,7 @@ from . import command_line, flow, raster, scan, units
 from .colours import Colours
 from .labels import as_label, flatten, in_unit
 from .movie import shared_colours
-from .raster import lattice
+from .raster import division, lattice
 from .results import BadInput, Surface, opened
 from .tubes import choose_columns
 
@@ -48,16 +48,10 @@ def packed(values, low, high):
 
 def node_triangles(cells, order):
     """The order^2 flat triangles between the nodes of each cell, nodes in VTK's order."""
+    places, corners = division(order)
     number = {tuple(place): i for i, place in enumerate(lattice(order))}
-    corners = []
-    for i in range(order):
-        for j in range(order - i):
-            k = order - i - j
-            corners.append([(k, i, j), (k - 1, i + 1, j), (k - 1, i, j + 1)])
-            if i + j < order - 1:
-                corners.append([(k - 1, i + 1, j), (k - 2, i + 1, j + 1), (k - 1, i, j + 1)])
-    pick = np.array([[number[place] for place in triangle] for triangle in corners])
-    return cells[:, pick].reshape(-1, 3)
+    nodes = np.array([number[tuple(place)] for place in np.rint(order * places).astype(int)])
+    return cells[:, nodes[corners]].reshape(-1, 3)
 
 
 class Shape:
@@ -101,16 +95,9 @@ def described_fields(shapes, result, printed):
             continue
         values = np.concatenate([shape.fields[name] for shape in shapes])
         colours = field_colours(name, values, result, printed)
-        out.append({
-            "name": name,
-            "symbol": SYMBOLS.get(name, name.replace("_", " ")),
-            "words": colours.label,
-            "unit": result.unit(units.OF_FRAMES.get(name)),
-            "low": float(values.min()),
-            "high": float(values.max()),
-            "shown": [float(colours.norm.vmin), float(colours.norm.vmax)],
-            "colours": colour_table(colours.map),
-        })  # fmt: skip
+        out.append({"name": name, "symbol": SYMBOLS.get(name, name.replace("_", " ")), "words": colours.label,
+                    "unit": result.unit(units.OF_FRAMES.get(name)), "low": float(values.min()), "high": float(values.max()),
+                    "shown": [float(colours.norm.vmin), float(colours.norm.vmax)], "colours": colour_table(colours.map)})  # fmt: skip
     return out
 
 
