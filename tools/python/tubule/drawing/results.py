@@ -328,18 +328,18 @@ def _in_time(frames):
     return [frames[i] for i in _increasing(np.array([frame.time for frame in frames]))] if frames else []
 
 
-def _arrays(path, name, group, keys):
-    missing = [key for key in keys if key not in group]
+def _arrays(path, name, group, needed, others=()):
+    """By name: what is needed, and the others as far as they are there."""
+    missing = [key for key in needed if key not in group]
     if missing:
         raise BadInput(f"{path}: frame {name} lacks {', '.join(missing)}")
-    return [np.asarray(finite_values(group[key]), float) for key in keys]
+    return {key: np.asarray(finite_values(group[key]), float) for key in (*needed, *others) if key in group}
 
 
 def _profile(path, name, record):
-    keys = ["z", "r", "H", "K", *(key for key in ("u_n", "u_t", "u_theta", "H0", "energy_density") if key in record)]
-    arrays = dict(zip(keys, _arrays(path, name, record, keys)))
+    arrays = _arrays(path, name, record, ("z", "r", "H", "K"), ("u_n", "u_t", "u_theta", "H0", "energy_density"))
     if any(array.ndim != 1 or array.shape != arrays["z"].shape or array.size < 2 for array in arrays.values()):
-        raise BadInput(f"{path}: frame {name}: {', '.join(keys)} must be lists of one length, 2 or more")
+        raise BadInput(f"{path}: frame {name}: {', '.join(arrays)} must be lists of one length, 2 or more")
     parameter = float(record.attrs["parameter"]) if "parameter" in record.attrs else None
     return Frame(float(record.attrs["time"]), **arrays, parameter=parameter, period=float(record.attrs.get("length", 0)))
 
@@ -347,24 +347,19 @@ def _profile(path, name, record):
 def _surface(path, name, record, meshes):
     number = int(record.attrs["mesh"])
     mesh = meshes[f"{number:06d}"]
-    order, period = (mesh.attrs[key] for key in ("order", "period"))
+    order, period = int(mesh.attrs["order"]), float(mesh.attrs["period"])
     cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
-    (points,) = _arrays(path, name, record, ("Points",))
-    data = record["PointData"]
-    keys = ["H", "K", "normal", *(key for key in ("u", "u_n", "p", "H0", "energy_density") if key in data)]
-    keys += sorted(key for key in data if key.startswith("mode_"))
-    arrays = dict(zip(keys, _arrays(path, name, data, keys)))
-    vectors = [array for key, array in arrays.items() if key in ("normal", "u")]
-    numbers = [array for key, array in arrays.items() if key not in ("normal", "u")]
-    if any(a.shape != points.shape for a in vectors) or any(a.shape != points.shape[:1] for a in numbers):
-        names = ", ".join(["Points", "normal", "H", "K", *keys[3:]])
-        raise BadInput(f"{path}: frame {name}: {names} must have one row per point")
-    if ("u" in arrays) != ("u_n" in arrays):
+    points = _arrays(path, name, record, ("Points",))["Points"]
+    others = ("u", "u_n", "p", "H0", "energy_density", *sorted(key for key in record["PointData"] if key.startswith("mode_")))
+    nodes = _arrays(path, name, record["PointData"], ("normal", "H", "K"), others)
+    if any(a.shape != (points.shape if key in ("normal", "u") else points.shape[:1]) for key, a in nodes.items()):
+        raise BadInput(f"{path}: frame {name}: {', '.join(['Points', *nodes])} must have one row per point")
+    if ("u" in nodes) != ("u_n" in nodes):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
-    number_of = values(mesh["point_node"]) if period > 0 else np.arange(len(points))
-    nodes, drawn = {"points": points, "node": number_of} | arrays, ("points", "normal", "H", "K", "u", "u_n", "p", "H0", "energy_density")
-    of_cells = {key: array[cells] for key, array in nodes.items() if key in drawn}
+    of_cells = {key: array[cells] for key, array in {"points": points, **nodes}.items()}
+    modes = {key: of_cells.pop(key) for key in nodes if key.startswith("mode_")}
     if period > 0:
         join_periods(of_cells["points"], period)
-    modes = {key: array[cells] for key, array in nodes.items() if key.startswith("mode_")}
-    return Surface(float(record.attrs["time"]), int(order), period == 0, **of_cells, modes=modes, period=float(period), mesh=number, cells=cells, nodes=nodes)
+    nodes |= {"points": points, "node": values(mesh["point_node"]) if period > 0 else np.arange(len(points))}
+    return Surface(float(record.attrs["time"]), order, period == 0, **of_cells, modes=modes, period=period, mesh=number, cells=cells,
+                   nodes=nodes)  # fmt: skip
