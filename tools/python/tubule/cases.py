@@ -20,15 +20,7 @@ def _key(name: str) -> str:
 
 
 def _text(value: str) -> str:
-    out = '"'
-    for c in value:
-        if c in '"\\':
-            out += "\\" + c
-        elif ord(c) < 0x20 or ord(c) == 0x7F:
-            out += f"\\u{ord(c):04x}"
-        else:
-            out += c
-    return out + '"'
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML has JSON's texts, but for that character
 
 
 MOST_LEVELS = 50  # of tables and lists within one another

@@ -5,21 +5,13 @@ The package tubule around this folder is not imported, for it needs its compiled
 
 import functools
 import importlib
-import importlib.util
 import os
 import signal
 import sys
+import types
 from pathlib import Path
 
 EXIT_INTERRUPTED = 130
-FOLDER = Path(__file__).resolve().parent
-
-
-def import_as(name):
-    """The package of this folder under another name than tubule.drawing."""
-    spec = importlib.util.spec_from_file_location(name, FOLDER / "__init__.py", submodule_search_locations=[str(FOLDER)])
-    sys.modules[name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(sys.modules[name])
 
 
 class EndedByInterrupts:
@@ -52,13 +44,12 @@ def prepared(script, lines):
 def main():
     with EndedByInterrupts():
         sys.path.pop(0)  # this folder, whose modules are not to be found under their bare names
-        import_as("tubule_drawing")
+        path = Path(sys.argv.pop(1))
+        places = [str(Path(__file__).resolve().parent), *([str(path.parent)] if path.suffix == ".py" else [])]
+        sys.modules["tubule_drawing"] = package = types.ModuleType("tubule_drawing")
+        package.__path__ = places
         lines = importlib.import_module("tubule_drawing.command_line")
-    path = Path(sys.argv.pop(1))
-    script = path.stem
-    if path.suffix == ".py":
-        sys.modules["tubule_drawing"].__path__.append(str(path.parent))
-    return lines.status_of(lambda: prepared(script, lines)())
+    return lines.status_of(lambda: prepared(path.stem, lines)())
 
 
 if __name__ == "__main__":

@@ -39,9 +39,7 @@ def division(n):
     index = {(i, j): number for number, (i, j) in enumerate((i, j) for i in range(n + 1) for j in range(n + 1 - i))}
     places = np.array([((n - i - j) / n, i / n, j / n) for i, j in index])
     up = [(index[i, j], index[i + 1, j], index[i, j + 1]) for i in range(n) for j in range(n - i)]
-    down = [
-        (index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]) for i in range(n - 1) for j in range(n - 1 - i)
-    ]
+    down = [(index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]) for i in range(n - 1) for j in range(n - 1 - i)]
     return places, np.array(up + down)
 
 

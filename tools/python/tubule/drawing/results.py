@@ -178,8 +178,7 @@ class Result:
     @property
     def end_time(self):
         """Time of the last frame or row; 0 without any."""
-        ends = [frame.time for frame in [*self.frames[-1:], *self.surfaces[-1:]]] + list(self.series.get("time", [])[-1:])
-        return float(max(ends, default=0.0))
+        return float(max(self.last_shape_time, *self.series.get("time", [])[-1:], 0.0))
 
     @property
     def last_shape_time(self):
