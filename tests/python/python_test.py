@@ -79,7 +79,7 @@ class Cases(Folder):
 
     def test_values_as_toml(self):
         for value, text in ((True, "true"), (3, "3"), (1e-30, "1e-30"), (np.float64(0.5), "0.5"), (np.int64(2), "2"),
-                            (np.array([1.0, 2.0]), "[1.0, 2.0]"), ('a"b\\\n', '"a\\"b\\\\\\u000a"'), (Path("x"), '"x"'),
+                            (np.array([1.0, 2.0]), "[1.0, 2.0]"), ('a"b\\\n\x7f', '"a\\"b\\\\\\n\\u007f"'), (Path("x"), '"x"'),
                             ({"a b": None, "c": {"d": ()}}, "{c = {d = []}}")):
             self.assertEqual(cases.toml_value(value), text)
         with self.assertRaisesRegex(ValueError, "finite"):

@@ -103,9 +103,7 @@ class Case:
 
     @classmethod
     def _parsed(cls, text: str, sets: list[str], path: str) -> "Case":
-        case = cls.__new__(cls)
-        case._core = _core.parse_case(text, sets, path)
-        return case
+        return cls._of(_core.parse_case(text, sets, path))
 
     @classmethod
     def _of(cls, core: _core.Case) -> "Case":

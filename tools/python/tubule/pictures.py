@@ -51,9 +51,8 @@ def draw(what, output: str | os.PathLike | Iterable[str | os.PathLike] | None = 
         options = command_line.plot_options([*words, *["--logx"] * bool(logx), *["--logy"] * bool(logy), "result"])
         style.check_outputs(outputs)
         with matplotlib.rc_context(style.SETTINGS), style.page(dpi, options.width):
-            file = _scan_file(what)
-            if file is not None:
-                figure = scan.figure_of(_scan_in(file, units), quantity, list(slices))
+            if found := _scan_of(what, units):
+                figure = scan.figure_of(found, quantity, list(slices))
             else:
                 if quantity or slices:
                     raise command_line.BadInput("--quantity and --slices belong to scans, and this is none")
@@ -94,26 +93,21 @@ def _errors(command_line):
         raise ValueError(re.sub("--(?=[a-z])", "", str(error)).removeprefix("tubule plot: ")) from None
 
 
-def _scan_in(file: str, units: str):
-    """As the drawing code reads it, in these units."""
-    from .drawing import scan
-    from .drawing.units import are_wanted
-
-    found = scan.Scan(file)
-    if not are_wanted(units, found.has_units):
-        return found
-    return found.convert(lambda sets: case_with_units(found.text, [*found.sets, *sets], file, units).units)
-
-
 def _listed(what) -> list:
     return [what] if isinstance(what, (Result, str, os.PathLike)) else list(what)
 
 
-def _scan_file(what) -> str | None:
-    from .drawing.scan import is_scan
+def _scan_of(what, units: str):
+    """The scan as the drawing code reads it, in these units; None where it is none."""
+    from .drawing import scan
+    from .drawing.units import are_wanted
 
-    if isinstance(what, Scan):
-        if what.file is None:
-            raise ValueError("this scan has no file: give scan() an output")
-        return what.file
-    return os.fspath(what) if isinstance(what, (str, os.PathLike)) and is_scan(os.fspath(what)) else None
+    if isinstance(what, Scan) and what.file is None:
+        raise ValueError("this scan has no file: give scan() an output")
+    file = what.file if isinstance(what, Scan) else os.fspath(what) if isinstance(what, (str, os.PathLike)) else None
+    if file is None or not isinstance(what, Scan) and not scan.is_scan(file):
+        return None
+    found = scan.Scan(file)
+    if not are_wanted(units, found.has_units):
+        return found
+    return found.convert(lambda sets: case_with_units(found.text, [*found.sets, *sets], file, units).units)

@@ -71,16 +71,17 @@ class Frame:
     @property
     def cells(self) -> np.ndarray:
         """Node numbers of the curved triangles of a surface, in VTK's order of Lagrange triangles."""
-        if self._mesh is None:
-            raise ValueError("this frame is a profile: triangles() makes a surface of it")
-        return self._mesh["cells"]
+        return self._of_mesh("cells")
 
     @property
     def order(self) -> int:
         """Polynomial order of the triangles of a surface."""
+        return self._of_mesh("order")
+
+    def _of_mesh(self, what: str):
         if self._mesh is None:
-            raise ValueError("this frame is a profile: it has no triangles")
-        return self._mesh["order"]
+            raise ValueError("this frame is a profile, without triangles: triangles() makes a surface of it")
+        return self._mesh[what]
 
     def _whole(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points, cells and the node of each point: a node that cells see a period away is one point more."""
@@ -109,6 +110,10 @@ class Frame:
             points[..., 2] += self._mesh["period"] * shifts
         return triangles.of_surface(points, self.cells, self.order, subdivide or self.order, self._mesh["period"])
 
+    def _data(self, node: np.ndarray) -> dict[str, np.ndarray]:
+        """What there is of the nodes, at these ones."""
+        return {name: a[node] for name, a in self.arrays.items() if name != "points" and len(a) == len(self.points)}
+
     def meshio(self):
         """A meshio.Mesh with all data of the nodes; profiles are revolved. Needs the package meshio."""
         import meshio
@@ -117,9 +122,8 @@ class Frame:
             points, cells = self.triangles()
             return meshio.Mesh(points, [("triangle", cells)])
         points, cells, node = self._whole()
-        data = {name: a[node] for name, a in self.arrays.items() if name != "points" and len(a) == len(self.points)}
         kind = {1: "triangle", 2: "triangle6"}.get(self.order, "VTK_LAGRANGE_TRIANGLE")
-        return meshio.Mesh(points, [(kind, cells)], point_data=data)
+        return meshio.Mesh(points, [(kind, cells)], point_data=self._data(node))
 
     def vtk(self):
         """A vtkUnstructuredGrid with all data of the nodes; profiles are revolved. Needs the Python modules of VTK."""
@@ -137,12 +141,10 @@ class Frame:
         list_.SetCells(len(cells), numpy_to_vtkIdTypeArray(np.hstack([width, cells]).astype(np.int64).ravel(), deep=True))
         grid.SetPoints(at)
         grid.SetCells(kind, list_)
-        if node is not None:
-            for name, a in self.arrays.items():
-                if name != "points" and len(a) == len(self.points):
-                    array = numpy_to_vtk(np.ascontiguousarray(a[node]), deep=True)
-                    array.SetName(name)
-                    grid.GetPointData().AddArray(array)
+        for name, values in ({} if node is None else self._data(node)).items():
+            array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+            array.SetName(name)
+            grid.GetPointData().AddArray(array)
         return grid
 
     def __repr__(self) -> str:
