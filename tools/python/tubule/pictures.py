@@ -79,7 +79,7 @@ def film(result: Result, output: str | os.PathLike, *, colour: str = "H", fps: f
         shown = result._shown()
         options = command_line.plot_options([f"--colour={colour}", f"--fps={float(fps)!r}", "result"])
         with matplotlib.rc_context(style.SETTINGS):
-            movie.draw(shown, shown.surfaces or shown.frames, file_name(output), options.colour[0], shown.title, options.fps, options.camera)
+            movie.draw(shown, shown.shapes, file_name(output), options.colour[0], shown.title, options.fps, options.camera)
 
 
 @contextmanager

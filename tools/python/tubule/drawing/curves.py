@@ -58,7 +58,7 @@ class CurvePanel(ProfilePanel):
     COLUMN_GAP = 0.1
     MAX_LENGTH = 3.2
 
-    def __init__(self, results, labels, columns, names, by_run=False):
+    def __init__(self, results, labels, columns, names, by_run):
         self.velocity = names == ["u_n"]
         if self.velocity:
             self.of, self.motions = "run" if by_run else "shape", motions_of(results, attrgetter("frames"), by_run)

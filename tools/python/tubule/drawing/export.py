@@ -6,7 +6,7 @@ from . import command_line, formats, triangles
 from .results import Surface, read_frame
 
 
-def triangles_of(shape, subdivide=None):
+def triangles_of(shape, subdivide):
     """Points and corners of a Frame or a Surface of results.py."""
     if isinstance(shape, Surface):
         return triangles.of_surface(shape.points, shape.nodes["node"][shape.cells], shape.order, subdivide or shape.order, shape.period)

@@ -17,18 +17,14 @@ from .series import BalancePanel, Choice, SeriesPanel, has_balance
 from .surfaces import SurfacePanel, choose_colours
 from .tubes import TubePanel, check_quantities, choose_columns
 
+NO_SURFACES = "no surfaces to draw; those of tier axisym are drawn by --kind profiles"
 NOTHING = {
-    "profiles": "no profiles",
-    "surface": "no surfaces",
-    "cuts": "no surfaces",
-    "energy": "no energy series",
-    "balance": "no dissipation over time",
-    "all": "neither frames nor an energy series",
-}
-OTHER_TIER = {
-    "profiles": "; those of tier surface3d are drawn by --kind surface or cuts",
-    "surface": "; those of tier axisym are drawn by --kind profiles",
-    "cuts": "; those of tier axisym are drawn by --kind profiles",
+    "profiles": "no profiles to draw; those of tier surface3d are drawn by --kind surface or cuts",
+    "surface": NO_SURFACES,
+    "cuts": NO_SURFACES,
+    "energy": "no energy series to draw",
+    "balance": "no dissipation over time to draw",
+    "all": "neither frames nor an energy series to draw",
 }
 
 
@@ -51,19 +47,18 @@ class Page:
         if self.wants("profiles"):
             shown = [frame for column in columns for frame in column.cells if frame]
             names = list(dict.fromkeys(self.options.colour or ["H", "K"]))
-            check_quantities(self.results, attrgetter("frames"), self.options.colour if any(frame.u_n is not None for frame in shown) else
-                             [name for name in self.options.colour if name != "u_n"])
-            graphs = all(frame.is_graph for frame in shown) and names != ["u_n"]
-            if graphs:
+            moves = any(frame.u_n is not None for frame in shown)
+            check_quantities(self.results, attrgetter("frames"), [name for name in self.options.colour if moves or name != "u_n"])
+            if all(frame.is_graph for frame in shown) and names != ["u_n"]:
                 yield TubePanel(self.results, self.labels, columns, names)
             else:
                 yield CurvePanel(self.results, self.labels, columns, names, self.options.scale == "run")
 
     def surfaces(self):
-        shown = [(r, label) for r, label in zip(self.results, self.labels) if r.surfaces]
+        shown = self._of(attrgetter("surfaces"))
         if not shown:
             return
-        results, labels = zip(*shown)
+        results, labels = shown
         columns = choose_columns(results, self.times, attrgetter("surfaces"))
         self.marked = self.marked or [column.time for column in columns if column.time is not None]
         if self.wants("surface"):
@@ -73,25 +68,25 @@ class Page:
             yield CutPanel(results, labels, columns, self.options.plane)
 
     def series(self):
-        everything = "all" in self.options.kind
-        if self.wants("energy"):
-            # A surface at rest and a single stationary shape have one row, which makes no curve.
-            least = [2 if everything and (r.surfaces or r.is_equilibrium) else 1 for r in self.results]
-            shown = [i for i, r in enumerate(self.results) if r.has_energy(least[i])]
-            equilibria = [i for i in shown if self.results[i].is_equilibrium]
-            runs = [i for i in shown if i not in equilibria]
-            if runs:
-                low, high = (end and end * self.results[0].scale("time") for end in (self.options.low, self.options.high))
-                yield EnergyPanel(*self._of(runs), self.marked, (low, high, self.options.logx))
-            if equilibria:
-                yield BranchPanel(*self._of(equilibria), self.marked)
-        if self.wants("balance"):
-            shown = [i for i, r in enumerate(self.results) if has_balance(r) and (r.moves or not everything)]
-            if shown:
-                yield BalancePanel(*self._of(shown), self.marked)
+        everything, scale = "all" in self.options.kind, self.results[0].scale("time")
 
-    def _of(self, shown):
-        return [self.results[i] for i in shown], [self.labels[i] for i in shown]
+        def has_energy(r):
+            """A surface at rest and a single stationary shape have one row, which makes no curve."""
+            return r.has_energy(2 if everything and (r.surfaces or r.is_equilibrium) else 1)
+
+        if self.wants("energy"):
+            if runs := self._of(lambda r: has_energy(r) and not r.is_equilibrium):
+                low, high = (end and end * scale for end in (self.options.low, self.options.high))
+                yield EnergyPanel(*runs, self.marked, (low, high, self.options.logx))
+            if equilibria := self._of(lambda r: has_energy(r) and r.is_equilibrium):
+                yield BranchPanel(*equilibria, self.marked)
+        if self.wants("balance"):
+            if shown := self._of(lambda r: has_balance(r) and (r.moves or not everything)):
+                yield BalancePanel(*shown, self.marked)
+
+    def _of(self, wanted):
+        """The results for which this holds, and their labels; nothing if there are none."""
+        return list(zip(*((r, label) for r, label in zip(self.results, self.labels) if wanted(r))))
 
     def panels(self):
         if self.options.series:
@@ -115,7 +110,7 @@ def figure_of(results, options):
         labels = [[as_label(label)] for label in options.label]
     panels = Page(results, labels, options).panels()
     if not panels:
-        raise BadInput(f"{', '.join(result.path for result in results)}: {NOTHING[options.kind[0]]} to draw{OTHER_TIER.get(options.kind[0], '')}")
+        raise BadInput(f"{', '.join(result.path for result in results)}: {NOTHING[options.kind[0]]}")
 
     heading = textwrap.wrap(", ".join(labels[0]), int(style.WIDTH / 0.072)) if len(results) == 1 else []
     title = 0.16 * len(heading) + 0.04 * bool(heading)
@@ -141,9 +136,9 @@ def draw_movie(options):
     if options.series or options.kind != ["all"] or options.output or len(options.colour) > 1 or options.dpi != style.DPI or options.width != style.WIDTH:
         raise BadInput("--movie goes with --times, --label, --fps, --camera, --units and one --colour only")
     result = units.read(paths[0], options.units)
-    frames = result.surfaces or result.frames
+    frames = result.shapes
     if options.times:
-        columns = choose_columns([result], [time * result.scale("time") for time in options.times], attrgetter("surfaces" if result.surfaces else "frames"))
+        columns = choose_columns([result], [time * result.scale("time") for time in options.times], attrgetter("shapes"))
         frames = [column.cells[0] for column in columns if column.cells[0]]
     title = as_label(options.label[0]) if options.label else result.title
     movie.draw(result, frames, options.movie, (options.colour or ["H"])[0], title, options.fps, options.camera)

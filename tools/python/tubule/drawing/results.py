@@ -138,6 +138,11 @@ class Result:
         return pretty_unit(self.units[of]["unit"]) if of in self.units else ""
 
     @property
+    def shapes(self):
+        """Its surfaces, else its profiles."""
+        return self.surfaces or self.frames
+
+    @property
     def vary(self):
         """The key that varies along its branch of equilibria, or an empty text."""
         return self.case.get("equilibrium", {}).get("branch", {}).get("vary", "")

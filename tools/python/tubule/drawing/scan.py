@@ -470,7 +470,7 @@ def read(path, option=""):
     return scan.convert(lambda sets: units.asked(path, option, sets)) if units.are_wanted(option, scan.has_units) else scan
 
 
-def figure_of(scan, quantity="", slices=(), confirmed=None):
+def figure_of(scan, quantity, slices, confirmed=None):
     """The map of a scan, or curves over its only axis."""
     path, part = scan.path, Slice(scan, slices)
     if not part.points["outcome"].any():

@@ -50,7 +50,7 @@ def apply():
 
 
 @contextmanager
-def page(dpi, width=WIDTH):
+def page(dpi, width):
     """Draws and writes with this DPI and WIDTH meanwhile."""
     global DPI, WIDTH
     if not DPI_RANGE[0] <= dpi <= DPI_RANGE[1]:
@@ -79,27 +79,25 @@ class Legend:
 
     SIZE, LINE = 0.06, 0.155  # inches: of a letter, of a line
 
-    def __init__(self, handles, title=None):
-        self.handles, self.title = handles, title
+    def __init__(self, handles):
+        self.handles = handles
         texts = [handle.get_label() for handle in handles]
         widest = max((len(line) for text in texts for line in text.split("\n")), default=0)
         self.columns = max(1, int(WIDTH / (0.6 + self.SIZE * widest))) if is_narrow() else 1
         self.right = 0.0 if is_narrow() or not handles else 0.5 + self.SIZE * widest
-        lines = max((text.count("\n") + 1 for text in texts), default=1) * -(-len(texts) // self.columns) + bool(title)
+        lines = max((text.count("\n") + 1 for text in texts), default=1) * -(-len(texts) // self.columns)
         self.below = self.LINE * lines + 0.1 if is_narrow() and handles else 0.0
 
     def draw(self, axes, bottom):
         """`bottom`: inches above the figure's edge of the room below."""
         if not self.handles:
             return
-        options = {"handles": self.handles, "title": self.title, "title_fontsize": 7, "borderaxespad": 0, "labelspacing": 0.4}
-        if not is_narrow():
-            axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), **options)
-            return
-        figure = axes.figure
-        place = 0.5, (bottom + self.below) / figure.get_figheight()
-        axes.legend(loc="upper center", bbox_to_anchor=place, bbox_transform=figure.transFigure, ncols=self.columns,
-                    columnspacing=1.0, **options)  # fmt: skip
+        place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.02)}
+        if is_narrow():
+            top = (bottom + self.below) / axes.figure.get_figheight()
+            place = {"loc": "upper center", "bbox_to_anchor": (0.5, top), "bbox_transform": axes.figure.transFigure,
+                     "ncols": self.columns, "columnspacing": 1.0}  # fmt: skip
+        axes.legend(handles=self.handles, borderaxespad=0, labelspacing=0.4, **place)
 
 
 def few_ticks(axis, inches, least=0.5):
@@ -134,12 +132,12 @@ def time_text(time, unit=""):
     return f"{number(float(f'{time:.4g}'))} {unit}".rstrip()
 
 
-def time_title(index, time, unit=""):
+def time_title(index, time, unit):
     """The words above the shapes at this time; None: above the last ones, each at its own time."""
     return "last state" if time is None else f"{time_name(index)} = {time_text(time, unit)}"
 
 
-def draw_scale_bar(axes, x, y, length, scale, unit=""):
+def draw_scale_bar(axes, x, y, length, scale, unit):
     """An upright bar of about this length, rounded to one digit, above (x, y); `scale` inches per unit of length."""
     bar = float(f"{length:.0e}")
     axes.plot([x, x], [y, y + scale * bar], color="0.1", linewidth=1.0, solid_capstyle="butt")
@@ -154,7 +152,7 @@ def check_outputs(paths):
 
 def save(figure, paths):
     for path in paths:
-        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(os.path.splitext(path)[1].lower())
+        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path[-4:].lower())
         try:
             figure.savefig(path, dpi=DPI, metadata=metadata)
         except OSError as error:

@@ -15,7 +15,7 @@ def join_periods(points, period):
     z -= period * np.round((z.mean(axis=1, keepdims=True) - np.median(z)) / period)
 
 
-def of_surface(points, nodes, order, subdivide, period=0.0):
+def of_surface(points, nodes, order, subdivide, period):
     """Each curved cell divided into subdivide^2 triangles, whose corners lie on it.
 
     points [cell, node of the cell, 3] in VTK's order, nodes [cell, node of the cell] the numbers that neighbours share. One

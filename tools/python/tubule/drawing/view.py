@@ -133,11 +133,10 @@ def ending(about):
 
 def run_page(result):
     """The data of the page of a Result."""
-    frames = result.surfaces or result.frames
-    if not frames:
+    if not result.shapes:
         raise BadInput(f"{result.path}: no shapes to show")
-    columns = choose_columns([result], None, attrgetter("surfaces" if result.surfaces else "frames"))
-    shapes = [Shape(frame) for frame in frames]
+    columns = choose_columns([result], None, attrgetter("shapes"))
+    shapes = [Shape(frame) for frame in result.shapes]
     fields = described_fields(shapes, result, [column.cells[0] for column in columns])
     along = "parameter" if result.is_equilibrium and "parameter" in result.series else "time"
     about, warnings = ending(result.about)
