@@ -246,22 +246,22 @@ class Columns(InFolder):
 class Scales(unittest.TestCase):
     def test_a_neck_does_not_set_the_colour_scale(self):
         values, area = np.append(np.linspace(-1, 1, 1000), -1e6), np.append(np.ones(1000), 1e-3)
-        norm, extend = colours.colour_scale([values], [area], 0.0)
+        norm, extend = colours.colour_scale(values, area, 0.0)
         self.assertAlmostEqual(norm.vmax, colours.MARGIN * colours.COVERED, delta=0.01)  # 98 % of a uniform spread
         self.assertEqual((norm.vmin, extend), (-norm.vmax, "min"))
 
     def test_white_is_the_mean_where_all_is_far_from_the_centre(self):
-        values, area = [np.linspace(-1.4, -0.8, 1001)], [np.ones(1001)]
+        values, area = np.linspace(-1.4, -0.8, 1001), np.ones(1001)
         self.assertTrue(colours.is_far(0.0, values, area))
         self.assertFalse(colours.is_far(-1.0, values, area))
-        (norm, extend), words = colours.about_mean(values, area)
+        (norm, extend), words = colours.about_mean(values, area, 1.0)
         self.assertAlmostEqual(norm(-1.1), 0.5)
         self.assertEqual((norm(-1.4) > 0, norm(-0.8) < 1, extend, words), (True, True, "neither", ", white: mean \u2248 \u22121.1"))
 
     def test_rounding_is_no_colour(self):
-        norm, extend = colours.colour_scale([np.array([1e-14, -1e-14])], [np.ones(2)], 0.0)
+        norm, extend = colours.colour_scale(np.array([1e-14, -1e-14]), np.ones(2), 0.0)
         self.assertEqual((norm.vmin, norm.vmax, extend), (-1, 1, "neither"))
-        norm, _ = colours.colour_scale([np.full(5, -2.0)], [np.ones(5)], -2.0)
+        norm, _ = colours.colour_scale(np.full(5, -2.0), np.ones(5), -2.0)
         self.assertEqual(norm(-2.0), 0.5)
 
     def test_interpolation_is_exact_on_parabolas_and_never_overshoots(self):

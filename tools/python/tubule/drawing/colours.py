@@ -43,70 +43,70 @@ class Colours:
         return plt.get_cmap(self.map)(self.norm(values))[..., :3]
 
 
-def colour_scale(values, areas, centre, one=1.0):
+def covered_to(part, value, area):
+    """Where the values, from the lowest on, have this part of the area."""
+    order = np.argsort(value)
+    place = np.searchsorted(np.cumsum(area[order]) / area.sum(), part)
+    return value[order][np.minimum(place, value.size - 1)]
+
+
+def colour_scale(value, area, centre, one=1.0):
     """A symmetric scale around `centre` that covers nearly all area, so that a pinching neck does not bleach the rest.
     `one`: what the number 1 of the file is."""
-    distance = np.abs(np.concatenate(values) - centre)
-    area = np.concatenate(areas)
-    order = np.argsort(distance)
-    covered = np.cumsum(area[order]) / area.sum()
-    half = MARGIN * distance[order][min(np.searchsorted(covered, COVERED), distance.size - 1)]
+    distance = np.abs(value - centre)
+    half = MARGIN * covered_to(COVERED, distance, area)
     if half < distance.max() <= WHOLE * half:
         half = distance.max()
     if half < ROUNDING * max(one, abs(centre)):
         half = max(one, abs(centre))
-    beyond_low = any((v < centre - half).any() for v in values)
-    beyond_high = any((v > centre + half).any() for v in values)
-    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond_low, beyond_high]
+    beyond = bool(value.min() < centre - half), bool(value.max() > centre + half)
+    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond]
     return Normalize(centre - half, centre + half), extend
 
 
-def covered_range(values, areas):
+def covered_range(value, area):
     """Lowest and highest value, but for what nearly no area has."""
-    value, area = np.concatenate(values), np.concatenate(areas)
-    order = np.argsort(value)
-    part = np.cumsum(area[order]) / area.sum()
     rest = (1 - COVERED) / 2
-    return value[order][min(np.searchsorted(part, rest), value.size - 1)], value[order][min(np.searchsorted(part, 1 - rest), value.size - 1)]
+    return covered_to(np.array([rest, 1 - rest]), value, area)
 
 
-def is_far(centre, values, areas):
+def is_far(centre, value, area):
     """Whether all values lie so far to one side of `centre` that a scale around it would show little of how they differ."""
-    low, high = covered_range(values, areas)
+    low, high = covered_range(value, area)
     return max(low - centre, centre - high) > FAR * (high - low) > 0
 
 
-def about_mean(values, areas, one=1.0):
+def about_mean(value, area, one):
     """A scale around the rounded mean, and words that say so."""
-    mean = np.average(np.concatenate(values), weights=np.concatenate(areas))
-    low, high = covered_range(values, areas)
+    low, high = covered_range(value, area)
     digits = 2 if high == low else max(2, 1 + int(np.ceil(np.log10(max(abs(low), abs(high)) / (high - low)))))
-    centre = float(f"{mean:.{digits}g}")
-    return colour_scale(values, areas, centre, one), f", white: mean \u2248 {number(centre)}"
+    centre = float(f"{np.average(value, weights=area):.{digits}g}")
+    return colour_scale(value, area, centre, one), f", white: mean \u2248 {number(centre)}"
 
 
 def colours_of(name, results, shapes, areas):
     """The colours of a quantity: one scale for all shapes; `areas` has the area of each of their values, a list per shape."""
-    values = [np.ravel(shape.quantity(name)) for shape in shapes]
+    value, area = np.concatenate([np.ravel(shape.quantity(name)) for shape in shapes]), np.concatenate(areas)
     one, label = results[0].scale(OF_FRAMES[name]), in_unit(LABELS[name], results[0].unit(OF_FRAMES[name]))
     if name == "u_n":
-        largest = max(float(np.abs(v).max()) for v in values) or 1.0
+        largest = float(np.abs(value).max()) or 1.0
         return Colours(VELOCITY, Normalize(-largest, largest), "neither", label + ", > 0: outward")
     if name == "energy_density":
-        low, high = covered_range(values, areas)
+        low, high = covered_range(value, area)
         low, high = min(0.0, low), MARGIN * high
-        return Colours("magma_r", Normalize(low, max(high, low + ROUNDING * one)), "max" if max(map(np.max, values)) > high else "neither", label)
+        extend = "max" if value.max() > high else "neither"
+        return Colours("magma_r", Normalize(low, max(high, low + ROUNDING * one)), extend, label)
     centre, words = 0.0, ""
     if name == "H":
         common = {result.H0 for result in results}
         centre = common.pop() if len(common) == 1 else 0.0
         words = f", white: {formula('H_0')} = {number(centre)}" if centre else ""
-    if name in ("H0", "p") or centre is None or (name in "HK" and is_far(centre, values, areas)):
-        scale, words = about_mean(values, areas, one)
+    if name in ("H0", "p") or centre is None or (name in "HK" and is_far(centre, value, area)):
+        scale, words = about_mean(value, area, one)
     else:
-        scale = colour_scale(values, areas, centre, one)
+        scale = colour_scale(value, area, centre, one)
     if scale[1] != "neither":  # a neck, say
-        words += f", from {power(min(map(np.min, values)), 2)} to {power(max(map(np.max, values)), 2)}"
+        words += f", from {power(value.min(), 2)} to {power(value.max(), 2)}"
     return Colours(MAPS[name], *scale, label + words)
 
 
