@@ -355,9 +355,10 @@ def _surface(path, name, record, meshes):
     cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     points = _arrays(path, name, record, ("Points",))["Points"]
     others = ("u", "u_n", "p", "H0", "energy_density", *sorted(key for key in record["PointData"] if key.startswith("mode_")))
-    nodes = _arrays(path, name, record["PointData"], ("normal", "H", "K"), others)
+    nodes = _arrays(path, name, record["PointData"], ("H", "K", "normal"), others)
     if any(a.shape != (points.shape if key in ("normal", "u") else points.shape[:1]) for key, a in nodes.items()):
-        raise BadInput(f"{path}: frame {name}: {', '.join(['Points', *nodes])} must have one row per point")
+        names = ", ".join(["Points", "normal", *(key for key in nodes if key != "normal")])
+        raise BadInput(f"{path}: frame {name}: {names} must have one row per point")
     if ("u" in nodes) != ("u_n" in nodes):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
     of_cells = {key: array[cells] for key, array in {"points": points, **nodes}.items()}
