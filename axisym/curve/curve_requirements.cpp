@@ -24,11 +24,11 @@ bool is_flat(const Curve& shape) {
 
 namespace {
 
-// A tube has formulas of its period, in equilibrium mirror-symmetric ones, since half a tube stands for the whole.
-void require_tube_fields(const Problem& c, const Curve& shape) {
-    for (const Potential& p : c.energy.potentials) {
-        require_period(c, "energy.potential", *p.formula, shape.length);
-        for (int i = 1; i <= 24 && shape.topology == Topology::half_tube; ++i) {
+// Half a tube, which stands for the whole, has mirror-symmetric formulas.
+void require_mirror_symmetry(const Problem& c, const Curve& shape) {
+    if (shape.topology != Topology::half_tube) return;
+    for (const Potential& p : c.energy.potentials)
+        for (int i = 1; i <= 24; ++i) {
             const double z = 0.0203 * shape.length * i, r = 0.6 + 0.07 * i, place[]{r, z}, mirrored[]{r, -z},
                          here = evaluate(*p.formula, place), there = evaluate(*p.formula, mirrored);
             if (std::abs(there - here) > 1e-6 * (1 + std::abs(here)))
@@ -37,7 +37,6 @@ void require_tube_fields(const Problem& c, const Curve& shape) {
                                             "{:.6g} at z = {:.4g} and {:.6g} at z = {:.4g}: try cosines",
                                             here, z, there, -z));
         }
-    }
 }
 
 }  // namespace
@@ -53,10 +52,8 @@ void require_place(const Problem& c, const Curve& shape) {
             if (p.is_wall()) distance = std::min(distance, p.distance(at[0], at[2]));
     }
     const bool tube = shape.topology == Topology::tube || shape.topology == Topology::half_tube;
-    const bool walls = std::ranges::any_of(potentials, &Potential::is_wall);
-    const bool periodic = tube && shape.length > 0;  // no torus
-    if (periodic && !walls) require_tube_fields(c, shape);
-    refuse_potentials(c, !(periodic && walls), bending_energy(shape, c.energy).potential, distance);
+    refuse_potentials(c, tube ? shape.length : 0, bending_energy(shape, c.energy).potential, distance);  // 0 of a torus
+    require_mirror_symmetry(c, shape);
 }
 
 double bead_distance(const Problem& c, const Curve& shape) {

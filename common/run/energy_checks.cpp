@@ -66,10 +66,14 @@ void require_pressure(const Problem& c, double volume) {
                     volume));
 }
 
-void refuse_potentials(const Problem& c, bool closed, double energy, double distance) {
+void refuse_potentials(const Problem& c, double period, double energy, double distance) {
     if (c.energy.potentials.empty()) return;
     const auto refuse = [&](const std::string& what) { throw complaint(c, "energy.potential", what); };
-    if (!closed) refuse("needs a closed surface, and the initial shape is a tube");
+    for (const Potential& p : c.energy.potentials) {
+        if (!(period > 0)) break;
+        if (p.is_wall()) refuse("needs a closed surface where it is a wall, and the initial shape is a tube");
+        require_period(c, "energy.potential", *p.formula, period);
+    }
     if (!(distance > 0))
         refuse(fmt::format("must have the initial shape in front of each wall, but a point of it is {:.4g} behind one",
                            -distance));

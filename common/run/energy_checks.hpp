@@ -19,9 +19,9 @@ std::string key_of_formula(const Bending& energy);
 // CaseError where F, theory.md (3.24), has no value initially, as the pressure is a formula of the volume.
 void require_pressure(const Problem& c, double volume);
 
-// CaseError where potentials of places do not suit the initial shape: not closed, an energy INT W dS that is not
-// finite, a point behind a wall (`distance` is the least one to a wall).
-void refuse_potentials(const Problem& c, bool closed, double energy, double distance);
+// CaseError where potentials of places do not suit the initial shape: on a tube (period > 0) walls and formulas of
+// another period, an energy INT W dS that is not finite, a point behind a wall (`distance` is the least one to a wall).
+void refuse_potentials(const Problem& c, double period, double energy, double distance);
 
 // CaseError where beads have no place on the initial shape: none with two poles, or poles that are too near.
 void require_beads(const Problem& c, bool closed, double distance);

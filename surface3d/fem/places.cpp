@@ -189,6 +189,8 @@ Eigen::MatrixXd unmoved_by(const Formula& W, const CurvedMesh& mesh, const Eigen
     constexpr double nothing = 1e-10;  // of the mean square of the slope
     constexpr int all = 6;
     Eigen::MatrixXd changes(mesh.size(), all);
+    const std::vector<int> possible =
+        mesh.period > 0 ? std::vector<int>{0, 1, 2, 5} : std::vector<int>{0, 1, 2, 3, 4, 5};
     double slopes = 0;
     for (int i = 0; i < mesh.size(); ++i) {
         const auto [value, x, y, z] = value_and_slope(W, mesh.nodes[i], 0);
@@ -196,10 +198,13 @@ Eigen::MatrixXd unmoved_by(const Formula& W, const CurvedMesh& mesh, const Eigen
         changes.row(i) << slope.transpose(), from.cross(slope).transpose();
         slopes += slope.squaredNorm();
     }
-    const Eigenpairs gram = eigenpairs(changes.transpose() * changes, true);
+    const Eigen::MatrixXd of_possible = changes(Eigen::all, possible);
+    const Eigenpairs gram = eigenpairs(of_possible.transpose() * of_possible, true);
     Eigen::Index n = 0;
-    while (n < all && gram.values[n] <= nothing * slopes) ++n;
-    return gram.vectors.leftCols(n);
+    while (n < gram.values.size() && gram.values[n] <= nothing * slopes) ++n;
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, n);
+    out(possible, Eigen::all) = gram.vectors.leftCols(n);
+    return out;
 }
 
 }  // namespace tubule::surface3d

@@ -12,6 +12,7 @@ double axial_force(const MovingSurface& surface, const MotionState& state, const
     const SurfaceLaw& law = surface.law();
     const Tabulation& table = space.tabulation();
     const Bending bending = with_M(surface.bending(), M);
+    const std::optional<Formula> W = potential_density_in_space(bending.potentials);
     Eigen::VectorXd p = Eigen::VectorXd::Constant(mesh.size(), -tension);
     if (law.inextensible && state.p.size() > 0) p = surface.pressure_at_nodes(state);
     Eigen::VectorXd of_cell(space.cells());
@@ -41,9 +42,9 @@ double axial_force(const MovingSurface& surface, const MotionState& state, const
                 of_gradients = space.gather(fields.mu, cell).dot(phi) * s.H +
                                bending.kg * (slope.squaredNorm() * s.area - 2 * across * across);
             }
-            sum +=
-                table.weight[q] * x.area *
-                (of_gradients + f.H * s.H + f.K * s.K + (f.f - nodal_p.dot(phi)) * s.area + 2 * law.viscosity * strain);
+            const double pulls = f.f + PointPotential(W, x.x).value - nodal_p.dot(phi);
+            sum += table.weight[q] * x.area *
+                   (of_gradients + f.H * s.H + f.K * s.K + pulls * s.area + 2 * law.viscosity * strain);
         }
         of_cell[cell] = sum;
     });

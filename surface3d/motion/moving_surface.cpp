@@ -18,12 +18,12 @@ constexpr double kept = 1e-12;            // area and volume, relative
 constexpr double still_kept = 1e-8;       // a larger defect rejects the step
 constexpr double slight_friction = 1e-4;  // relative to viscosity/area; used if nothing else resists rigid motions
 
-// Combinations of translations and rotations about the origin, or of a tube the axis, that no potential and no bead
-// resists: beads let a surface move along the axis and turn about it.
+// Combinations of translations and rotations about the origin, of a tube about the axis alone, that no potential and no
+// bead resists: beads let a surface move along the axis and turn about it.
 Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, bool with_beads) {
     constexpr int all = 6, along = 2, around = 5;
-    if (mesh.period > 0) return Eigen::MatrixXd::Identity(4, 4);
     Eigen::MatrixXd out = Eigen::MatrixXd::Identity(all, all);
+    if (mesh.period > 0) out = out(Eigen::all, std::array{0, 1, 2, around}).eval();
     if (const auto W = potential_density_in_space(bending.potentials)) {
         const double size = node_positions(mesh).cwiseAbs().maxCoeff();
         out = unmoved_by(*W, mesh, Eigen::Vector3d::Zero(), size);
@@ -194,17 +194,15 @@ Eigen::VectorXd MovingSurface::pressure_at_nodes(const MotionState& state) const
 Eigen::MatrixXd MovingSurface::rigid_motions(const CurvedMesh& mesh) const {
     Places at(4, nodes());
     at << Eigen::RowVectorXd::Ones(nodes()), node_positions(mesh);
-    return rigid_motions(at, mesh.period > 0);
+    return rigid_motions(at);
 }
 
-// Velocities, a column each, component by component: translations, and rotations that the surface allows; of these
-// what nothing at places resists.
-Eigen::MatrixXd MovingSurface::rigid_motions(const Places& at, bool tube) const {
+// Velocities, a column each, component by component: of translations and rotations those that are free.
+Eigen::MatrixXd MovingSurface::rigid_motions(const Places& at) const {
     const int n = nodes();
-    Eigen::MatrixXd out(3 * n, tube ? 4 : 6);
+    Eigen::MatrixXd out(3 * n, 6);
     for (int motion = 0; motion < out.cols(); ++motion) {
-        const int axis = tube && motion == 3 ? 2 : motion % 3;
-        const Eigen::Vector3d e = Eigen::Vector3d::Unit(axis);
+        const Eigen::Vector3d e = Eigen::Vector3d::Unit(motion % 3);
         for (int d = 0; d < 3; ++d) {
             const int j = (d + 1) % 3, k = (d + 2) % 3;
             auto to = out.col(motion).segment(d * n, n);
@@ -225,7 +223,7 @@ Eigen::MatrixXd MovingSurface::momenta(const CurvedMesh& mesh) const {
         const SurfacePoint<double> p = tangent_point(X, table, q);
         sum += (table.weight[q] * p.area * Eigen::Vector4d(1, p.x[0], p.x[1], p.x[2])) * table.value.col(q).transpose();
     });
-    return rigid_motions(at, mesh.period > 0);
+    return rigid_motions(at);
 }
 
 Eigen::MatrixXd MovingSurface::open_rigid_motions(const CurvedMesh& mesh) const {

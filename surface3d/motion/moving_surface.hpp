@@ -115,7 +115,7 @@ private:
     // 1 and x at the nodes, or their integrals against each function: one column a node.
     using Places = Eigen::Matrix<double, 4, Eigen::Dynamic>;
     Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
-    Eigen::MatrixXd rigid_motions(const Places& at, bool tube) const;
+    Eigen::MatrixXd rigid_motions(const Places& at) const;
     Eigen::MatrixXd momenta(const CurvedMesh& mesh) const;
     BeadNumbers held_beads(const CurvedMesh& mesh) const;
     Extent lack(const CurvedMesh& mesh, double time, const BeadNumbers& beads) const;

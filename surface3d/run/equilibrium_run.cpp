@@ -26,7 +26,7 @@ Task task_of(const Problem& c, const Start& start) {
     const CurvedMesh mesh = start.mesh(std::max(c.surface.elements.value_or(0), many), c.element_order).mesh;
     const EnergyValues v = DiscreteEnergy(mesh, c.energy).values(mesh, c.energy);
     require_pressure(c, v.volume);
-    refuse_potentials(c, mesh.period == 0, v.potential, wall_distance(mesh, c.energy.potentials).value);
+    refuse_potentials(c, mesh.period, v.potential, wall_distance(mesh, c.energy.potentials).value);
     Task task{stationary_problem(c, v.area, v.volume), {}, {}, {}};
     check_problem(c, task.problem, mesh.period);
     if (c.law.beads) {

@@ -115,7 +115,7 @@ void remember_start(const Problem& c, const StartMesh& start, const SurfaceSpace
     require_defined(c, start.mesh, fields.H, fields.K, memory.H0);
     require_pressure(c, o.volume);
     const bool closed = start.mesh.period == 0;
-    refuse_potentials(c, closed, o.potential, wall_distance(start.mesh, c.energy.potentials).value);
+    refuse_potentials(c, start.mesh.period, o.potential, wall_distance(start.mesh, c.energy.potentials).value);
     const double length = start_length(c, start.mesh);
     if (c.law.beads) {
         require_beads(c, closed, length);

@@ -88,9 +88,9 @@ TEST(Places, StepsAreImplicit) {
     EXPECT_GT(std::log2(off[0] / off[1]), 1.7) << off[0] << " " << off[1];
 }
 
-// A vesicle that W = -z draws through its friction: of a fixed area the pull on it is uniform, u = (1 - exp(-gamma
-// t))/gamma e_z with inertia; it stays a sphere.
-TEST(Places, ASphereIsDrawnThroughItsFriction) {
+// What a uniform pull draws through its friction: of a fixed area u = (1 - exp(-gamma t))/gamma with inertia, and
+// nothing changes its shape. A vesicle along the axis, a tube across it.
+TEST(Places, ShapesAreDrawnThroughTheirFriction) {
     const std::string drawn = R"(
 energy = {k20 = 0.5, potential = [{kind = "formula", formula = "-z"}]}
 shape = {kind = "sphere", radius = 1}
@@ -98,24 +98,53 @@ discretisation = {elements = 80}
 accuracy = {energy = 1e-3}
 time = {end = 0.5}
 )";
-    for (const std::string kind : {"fluid", "overdamped"}) {
-        SCOPED_TRACE(kind);
-        const Outcome o =
-            run_case(drawn, {"model={kind=\"" + kind + "\", gamma=2, volume=\"free\"}", "accuracy.estimate=false"});
-        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
-        const bool inert = kind == "fluid";
-        const double speed = inert ? (1 - std::exp(-1.0)) / 2 : 0.5, way = inert ? (0.5 - speed) / 2 : 0.25;
-        const double A = 4 * pi, E_ref = o.summary.reference_energy;
-        EXPECT_NEAR(o.last("speed"), speed, 5e-3 * speed);
-        EXPECT_NEAR(o.last("potential_energy"), -A * way, 1e-3 * A * way);
-        EXPECT_NEAR(o.last("potential_force"), A, 1e-4 * A);
-        EXPECT_NEAR(o.last("momentum_x"), 0, 1e-9);
-        if (inert) {
-            EXPECT_NEAR(o.last("momentum_z"), A * speed, 1e-3 * A * speed);
+    for (const bool tube : {false, true})
+        for (const std::string kind : {"fluid", "overdamped"}) {
+            SCOPED_TRACE(kind + (tube ? " tube" : " sphere"));
+            std::vector<std::string> sets{"model={kind=\"" + kind + "\", gamma=2, volume=\"free\"}",
+                                          "accuracy.estimate=false"};
+            if (tube) {
+                sets.insert(sets.end(), {"energy.potential.0.formula=-x", "shape={kind=\"tube\", radius=1, length=2}",
+                                         "discretisation.elements=40"});
+            }
+            const Outcome o = run_case(drawn, sets);
+            ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+            const bool inert = kind == "fluid";
+            const double speed = inert ? (1 - std::exp(-1.0)) / 2 : 0.5, way = inert ? (0.5 - speed) / 2 : 0.25;
+            const double A = 4 * pi, E_ref = o.summary.reference_energy;
+            EXPECT_NEAR(o.last("speed"), speed, 6e-3 * speed);
+            EXPECT_NEAR(o.last("potential_energy"), -A * way, 1e-3 * A * way);
+            EXPECT_NEAR(o.last("potential_force"), tube ? 0 : A, 1e-4 * A);
+            EXPECT_NEAR(o.last(tube ? "momentum_z" : "momentum_x"), 0, 1e-9);
+            if (inert) {
+                EXPECT_NEAR(o.last(tube ? "momentum_x" : "momentum_z"), A * speed, 1e-3 * A * speed);
+            }
+            for (const double defect : o.series("identity_defect")) EXPECT_LT(std::abs(defect), 1e-3 * E_ref);
+            EXPECT_NEAR(o.last("r_max"), tube ? 1 + way : 1, 1e-3);
         }
-        for (const double defect : o.series("identity_defect")) EXPECT_LT(std::abs(defect), 1e-3 * E_ref);
-        EXPECT_NEAR(o.last("r_max"), 1, 1e-4);
-    }
+}
+
+// Expected: `tubule run` of the same case in tier axisym with accuracy.energy = 1e-6.
+TEST(Places, TubesFollowAPeriodicField) {
+    const std::string wavy = R"(
+energy.k20 = 0.5
+energy.potential = [{kind = "formula", formula = "0.1*cos(2*pi*z/3) + 0.05*sin(4*pi*z/3) + 0.3*x^2 + 0.3*y^2"}]
+shape = {kind = "tube", radius = 0.8, length = 3, mode = [{amplitude = 0.1, n = 1}]}
+discretisation = {elements = 40}
+accuracy = {energy = 1e-3, estimate = false}
+time = {end = 0.3}
+)";
+    const Outcome o = run_case(wavy, {"model={kind=\"overdamped\", gamma=1, volume=\"free\"}"});
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const double E_ref = o.summary.reference_energy;
+    EXPECT_NEAR(o.last("free_energy"), 14.6423313, 1e-3 * E_ref);
+    EXPECT_NEAR(o.last("tension"), 0.1759142, 1e-4);
+    EXPECT_NEAR(o.last("force"), 5.7723861, 5e-3);
+    for (const double defect : o.series("identity_defect")) EXPECT_LT(std::abs(defect), 2e-3 * E_ref);
+    const auto refused = [&](const std::string& W) {
+        return test::message_of<CaseError>([&] { run_case(wavy, {"energy.potential.0.formula=" + W}); });
+    };
+    EXPECT_CONTAINS(refused("cos(z)"), "must have the period 3 of the tube");
 }
 
 const std::string pulled = R"(

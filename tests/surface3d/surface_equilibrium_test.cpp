@@ -195,6 +195,54 @@ TEST(SurfaceSpectrum, sphereAboutAParticle) {
     EXPECT_EQ(SurfaceSystem(spheroid(320, 1.2, 1.6), {both, {}}).held_motions(), 0);
 }
 
+// A tube in a field that is slightly elliptic about an axis beside its own: to first order a circle about that axis,
+// with k20/R^2 = W + R W', and a wave m = 2; theory.md (2.22).
+TEST(SurfaceSpectrum, tubeInAField) {
+    const double length = 2, b = 0.03, R = std::pow(0.5 / 0.9, 0.25);
+    const auto in_field = [](const std::string& W) {
+        Bending bending{.k = {0.5}};
+        bending.potentials = {{.kind = Potential::Kind::formula,
+                               .formula = std::make_shared<const Formula>(parse_formula(W, Potential::in_space))}};
+        return bending;
+    };
+    const theory::UniformTube tube{{.k = {0.5}}, R, 0.3 * R * R};
+    const auto stiffness = [&](int m, int n) { return theory::stiffness(tube, m)(2 * pi * n / length) + 4 * 0.3; };
+    const CurvedMesh mesh = mapped_mesh(tube_rings(R, length, 4, 12), 4, [&](const Eigen::Vector3d& p) {
+        return Eigen::Vector3d(p.x() / p.head<2>().norm() * R, p.y() / p.head<2>().norm() * R, p.z());
+    });
+    const auto stationary = [&](SurfaceSystem& system) {
+        Eigen::VectorXd u = system.unknowns_at_base();
+        int iterations = 0;
+        EXPECT_TRUE(Newton(system, u, iterations).converge(0.1));
+        return u;
+    };
+    SurfaceSystem round(mesh, {in_field("0.3*(x^2 + y^2)"), {}});
+    EXPECT_EQ(round.held_motions(), 0);  // along the axis and about it without a normal part, across it not free
+    const Eigen::VectorXd u = stationary(round);
+    const double E = 2 * pi * length * (0.5 / R + 0.3 * R * R * R), L = length;
+    EXPECT_NEAR(round.values(u).energy, E, 1e-5 * E);
+    std::vector<double> expected;
+    for (int m = 0; m <= 3; ++m)
+        for (int n = 0; n <= 2; ++n)
+            expected.insert(expected.end(), (m > 0 ? 2 : 1) * (n > 0 ? 2 : 1), stiffness(m, n));
+    std::sort(expected.begin(), expected.end());
+    const SurfaceSpectrum s = round.spectrum(u, 7);
+    for (int i = 0; i < 7; ++i) EXPECT_NEAR(s.values[i], expected[i], 5e-3 * std::abs(expected[i])) << i;
+
+    SurfaceSystem system(mesh, {in_field(fmt::format("0.3*((x - 0.02)^2 + y^2) + {}*((x - 0.02)^2 - y^2)", b)), {}});
+    const Eigen::VectorXd v = stationary(system);
+    double most = 0;
+    for (const Eigen::Vector3d& x : system.mesh(v).nodes) most = std::max(most, x.x());
+    EXPECT_NEAR(most, 0.02 + R - 3 * b * R / stiffness(2, 0), 1e-4);
+    const double falls = pi * R * L * std::pow(3 * b * R, 2) / stiffness(2, 0) / 2;
+    EXPECT_NEAR(round.values(u).energy - system.values(v).energy, falls, 0.02 * falls);
+    // Free: along y; a screw; a slide along an axis of which W knows nothing has no normal part on a straight tube.
+    EXPECT_EQ(SurfaceSystem(mesh, {in_field("x^2"), {}}).held_motions(), 1);
+    const Bending screw = in_field("x*cos(pi*z) + y*sin(pi*z)");
+    EXPECT_EQ(unmoved_by(*screw.potentials[0].formula, mesh, Eigen::Vector3d::Zero(), 2).cols(), 1);
+    EXPECT_EQ(unmoved_by(*in_field("x^2 + y^2").potentials[0].formula, mesh, Eigen::Vector3d::Zero(), 2).cols(), 2);
+}
+
 // With beads: the Jacobian by central differences, and the gradient of the merit where positions follow from the shape.
 TEST(SurfaceSystem, beads) {
     for (const std::optional<double> held : {std::optional<double>(), std::optional(0.1)}) {
