@@ -1,5 +1,8 @@
 #include "common/case/problem.hpp"
 
+#include <cctype>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include "common/case/read.hpp"
@@ -27,6 +30,22 @@ Scheme scheme_of(const Case& c, bool inertia) {
 int default_order(const Case& c) {
     const bool measured = !c.moves() && !c.equilibrium;
     return measured && std::holds_alternative<MeshFile>(c.shape) ? 3 : 4;
+}
+
+// A formula of r and z as one of x, y and z.
+std::shared_ptr<const Formula> in_space(const Formula& of_profile) {
+    // sqrt has no derivatives at the axis: this has, and even powers of r are right to rounding.
+    const std::string r = "sqrt(x^2 + y^2 + 1e-20)", &from = of_profile.text;
+    const auto is_letter = [&](std::size_t at) {
+        return at < from.size() && std::isalpha(static_cast<unsigned char>(from[at]));
+    };
+    std::string text;
+    for (std::size_t i = 0; i < from.size(); ++i)
+        if (from[i] == 'r' && !is_letter(i - 1) && !is_letter(i + 1))
+            text += r;
+        else
+            text += from[i];
+    return std::make_shared<const Formula>(parse_formula(text, Potential::in_space));
 }
 
 }  // namespace
@@ -65,6 +84,8 @@ Problem Problem::of_surface() const {
                         "force_x and force_y instead");
     Case out = *this;
     out.tier = Tier::surface3d;
+    for (Potential& p : out.energy.potentials)
+        if (p.formula && tier != Tier::surface3d) p.formula = in_space(*p.formula);
     return out;
 }
 

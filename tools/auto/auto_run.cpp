@@ -404,8 +404,7 @@ RunSummary AutoRun::after_switch(const Record& at, const Before& before, const R
         if (a < grown * case_.automatic.noise && a < largest) a = 0;
 
     RunSummary s = clock_.pausing([&] {
-        Case handed = case_;
-        handed.tier = Tier::surface3d;
+        Case handed = case_.of_surface();
         handed.handover =
             Handover{perturbed_curve(case_, at, amplitudes), at.time, known.reference_energy, work_of(before, names_)};
         const Problem c = handed;

@@ -26,10 +26,9 @@ struct SurfaceModes {
 
 // The surface that the case looks for, or that nearest to the frame, with what the case holds.
 Problem problem_of(const StabilityOptions& options, const StabilitySubject& subject, const Model& model) {
-    Case c = subject.c;
+    Case c = subject.c.of_surface();
     const bool flows = model_entry(model.kind).inextensible;
     if (flows) c.model = model;
-    c.tier = Tier::surface3d;
     if (!c.equilibrium) c.equilibrium.emplace();
     EquilibriumChoices& e = *c.equilibrium;
     e.held = subject.c.equilibrium ? subject.c.held : default_held(subject.c.model);

@@ -97,7 +97,7 @@ bool speeds_up(const EnergyTrace& path, double part) {
 // The case with this model in the tier that shows its path: tier axisym; of starts that may leave it, tier "auto"; of
 // others, few triangles.
 Problem pilot_of(const Problem& c, ModelKind kind, bool axisymmetric) {
-    Case out = c;
+    Case out = axisymmetric ? c : c.of_surface();
     out.model.kind = kind;
     out.time = {.end = c.time.end, .output = {}, .stationary = {}, .limit = {}};
     out.discretisation = {}, out.surface = {};
@@ -106,7 +106,6 @@ Problem pilot_of(const Problem& c, ModelKind kind, bool axisymmetric) {
         if (!c.runs_in_tier_axisym()) out.tier = Tier::automatic;
         return out;
     }
-    out.tier = Tier::surface3d;
     out.surface.elements = surface3d::least_triangles;
     out.accuracy.energy = std::max(c.accuracy.energy, accuracy_of_surface), out.accuracy.estimate = false;
     return out;
