@@ -71,8 +71,8 @@ struct WallDistance {
 };
 WallDistance wall_distance(const CurvedMesh& mesh, std::span<const Potential> potentials);
 
-// Combinations of translations and of rotations about `centre`, of a tube about z alone, these per `size`, along which a
-// density of the place does not change at the nodes: one column of six each, translation before rotation.
+// Combinations of translations and of rotations about `centre`, of a tube about z alone, these per `size`, along which
+// a density of the place does not change at the nodes: one column of six each, translation before rotation.
 Eigen::MatrixXd unmoved_by(const Formula& W, const CurvedMesh& mesh, const Eigen::Vector3d& centre, double size);
 
 }  // namespace tubule::surface3d

@@ -12,8 +12,8 @@
 
 #include "axisym/run_profile.hpp"
 #include "common/case/problem.hpp"
-#include "common/run/run_observer.hpp"
 #include "common/run/run_clock.hpp"
+#include "common/run/run_observer.hpp"
 #include "common/series/table.hpp"
 #include "common/solve/pause.hpp"
 #include "surface3d/run/motion_settings.hpp"

@@ -20,8 +20,8 @@ WaveRates wave_rates(const Problem& c, const Record& frame);
 
 // The rate of a wave with inertia, from those of the same model without it (viscosity and friction alone) and of the
 // overdamped model (mass instead of friction): omega^2/overdamped + omega/stokes = 1, the root with the largest real
-// part. As each has the flow that suits it best, a fluid with the best compromise is no faster. On shapes that move, the
-// tensions of these flows differ, and so may the signs of their rates: the sign is that of what resists more.
+// part. As each has the flow that suits it best, a fluid with the best compromise is no faster. On shapes that move,
+// the tensions of these flows differ, and so may the signs of their rates: the sign is that of what resists more.
 double rate_with_inertia(double stokes, double overdamped);
 
 // The profile of a frame with the fastest growing mode of each m on it: relative_amplitudes[m - 1] of the largest
