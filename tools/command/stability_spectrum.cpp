@@ -146,7 +146,7 @@ std::string json_text(const std::vector<Found>& found, double kT) {
         for (const axisym::ModeRates& mode : spectrum.modes)
             modes.push_back({{"m", mode.m}, {"rates", mode.rates}, {"shape", mode.shape}});
         Json sorted = Json::array();
-        for (const auto& [rate, m, error] : slowest(spectrum)) sorted.push_back({{"m", m}, {"rate", rate}});
+        for (const SlowMode& mode : slowest(spectrum)) sorted.push_back({{"m", mode.m}, {"rate", mode.rate}});
         models.push_back({{"model", name(problem.model)},
                           {"at_rest", spectrum.at_rest()},
                           {"tension", spectrum.sigma},

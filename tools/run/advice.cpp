@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "axisym/curve/curve_output.hpp"
+#include "axisym/curve/curve_setup.hpp"
 #include "common/run/run_observer.hpp"
 #include "surface3d/run/motion_settings.hpp"
 #include "tools/auto/choice.hpp"
