@@ -71,10 +71,11 @@ struct GradientForms<Space>::Local {
             if constexpr (n > 4)
                 return J::variable(v[1][d], 3 + d);
             else
-                return J(d == 1 ? 1.0 : 0.0);
+                return d == 1 ? 1.0 : 0.0;
         };
         const J r0 = J::variable(v[0][0], 0), dr = J::variable(v[0][1], 1), ddr = J::variable(v[0][2], 2),
-                dddr = J::variable(v[0][3], 3), dz = z(1), ddz = z(2), dddz = z(3);
+                dddr = J::variable(v[0][3], 3);
+        const auto dz = z(1), ddz = z(2), dddz = z(3);
         const J ig = inverse_sqrt(dr * dr + dz * dz), ig2 = ig * ig, ig3 = ig2 * ig, ir = inverse(r0);
         const J kappa_s = (ddr * dz - dr * ddz) * ig3, kappa_theta = -(dz * ig * ir);
         const J H_s = (dddr * dz - dr * dddz) * ig3 - 3.0 * (kappa_s * ((dr * ddr + dz * ddz) * ig2)) +
