@@ -174,19 +174,19 @@ class Colours(unittest.TestCase):
     def test_normal_velocity_relative_to_its_largest(self):
         shapes = [moving_sphere(t) for t in (0, 1, 2)]
         result = results.Result("a.hdf", {}, {}, {}, [], shapes)
-        (quantity,) = surfaces.quantities(["u_n"], [result], shapes)
+        ((_, scale),) = surfaces.quantities(["u_n"], [result], shapes, "shape")
         motion = flow.Motion(shapes)
         for shape, largest in zip(shapes, (0, 1, 1)):
-            self.assertEqual(np.abs(quantity.at_nodes(shape, motion)).max(), largest)
-        red, blue, white = quantity.colours.rgb(np.array([1.0, -1.0, 0.0]))
+            self.assertEqual(np.abs(motion.relative(shape)).max(), largest)
+        red, blue, white = scale.rgb(np.array([1.0, -1.0, 0.0]))
         self.assertGreater(red[0], 2 * red[2])  # outward is red, as in the paper
         self.assertGreater(blue[2], 2 * blue[0])
         self.assertGreater(white.min(), 0.95)
 
     def test_pressure_is_white_at_its_mean(self):
         shape = moving_sphere(1)  # p = 5 + x
-        (quantity,) = surfaces.quantities(["p"], [results.Result("a.hdf", {}, {}, {}, [], [shape])], [shape])
-        norm = quantity.colours.norm
+        ((_, scale),) = surfaces.quantities(["p"], [results.Result("a.hdf", {}, {}, {}, [], [shape])], [shape], "shape")
+        norm = scale.norm
         self.assertAlmostEqual((norm.vmin + norm.vmax) / 2, 5, delta=1e-9)
         self.assertTrue(0.9 < (norm.vmax - norm.vmin) / 2 < 1.3)  # |x| <= 1, times MARGIN at most
 

@@ -81,13 +81,13 @@ class CurvePanel(ProfilePanel):
     def _draw_shape(self, axes, frame, row, places):
         ((x, y),) = places
         section = Section(frame, self.scale)
-        u_n, u_t = (self.motions[id(frame)].scale(name, frame) if self.velocity else 0 for name in ("u_n", "u_t"))
+        u_t = self.motions[id(frame)].scale("u_t", frame) if self.velocity else 0
         closing = np.concatenate([section.x, -section.x[::-1]]), np.concatenate([section.y, section.y[::-1]])
         axes.fill(x + closing[0], y + closing[1], color="0.95", linewidth=0, zorder=0)
         for side in (-1, 1):
             points = np.column_stack([x + side * section.x, y + section.y])
             axes.plot(*points.T, color="0.1", linewidth=OUTLINE, solid_capstyle="butt", zorder=3)
-            colour = self._colour(section, frame, side, u_n)
+            colour = self._colour(section, frame, side)
             pieces = np.stack([points[:-2], points[1:-1], points[2:]], axis=1)  # overlapping: no gaps between
             axes.add_collection(
                 LineCollection(pieces, colors=colour[1:-1], linewidths=BAND, rasterized=True, zorder=4), autolim=False
@@ -98,11 +98,11 @@ class CurvePanel(ProfilePanel):
                 axes.add_patch(FancyArrowPatch(path=way, zorder=5, **arrow_style(abs(along[-1] - along[0]))))
         self._draw_axis(axes, frame, x, y)
 
-    def _colour(self, section, frame, side, largest):
-        """The colours of the points of one side; `largest`: what velocities are relative to."""
+    def _colour(self, section, frame, side):
+        """The colours of the points of one side."""
         if not self.velocity:
             _, values, colours = self._halves(frame)[side > 0]
             return colours.rgb(section.at(values))
         if frame.u_n is None:
             return np.full((section.x.size, 3), 0.7)
-        return self.colours[0].rgb(section.at(frame.u_n) / (largest or np.inf))
+        return self.colours[0].rgb(section.at(self.motions[id(frame)].relative(frame)))

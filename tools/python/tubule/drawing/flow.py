@@ -51,6 +51,10 @@ class Motion:
         largest = self.largest(name, shape)
         return largest and (max(self.largest(name, other) for other in self.shapes) if self.by_run else largest)
 
+    def relative(self, shape):
+        """u_n over what it is drawn relative to; 0 at rest."""
+        return shape.u_n / (self.scale("u_n", shape) or np.inf)
+
     def words(self, shape):
         """The caption below the picture."""
         found = {"u_n": self.largest("u_n", shape), "u_t": self.largest("u_t", shape), "u_theta": shape.largest("u_theta")}

@@ -152,7 +152,7 @@ def check_outputs(paths):
 
 def save(figure, paths):
     for path in paths:
-        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path[-4:].lower())
+        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(os.path.splitext(path)[1].lower())
         try:
             figure.savefig(path, dpi=DPI, metadata=metadata)
         except OSError as error:

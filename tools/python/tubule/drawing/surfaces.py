@@ -88,17 +88,15 @@ class SurfacePanel(ShapesPanel):
                 symbol = flow.SYMBOLS.get(name, name.replace("_", " "))
                 axes.text(left, bottom + self.height - middle, symbol, ha="right", va="center", style="italic")
 
-    def _at_nodes(self, surface, name):
-        values = surface.quantity(name)
-        return values / (self.motions[id(surface)].scale(name, surface) or np.inf) if name == "u_n" else values  # at rest: white
-
     def _samples(self, surface):
         """The surface as samples of the smallest picture that contains it: the quantities, then the velocity in the view."""
         per_pixel = self.scale * style.DPI  # pixels per unit of length
         low, high = self.view.extent(surface.points.reshape(-1, 3))
         wide, tall = (int(np.ceil(extent * per_pixel + 2 * RIM * style.DPI)) for extent in high - low)
         rim = (np.array([wide, tall]) / per_pixel - (high - low)) / 2
-        fields = [self._at_nodes(surface, name)[..., None] for name in self.quantities]
+        motion = self.motions.get(id(surface))
+        fields = [motion.relative(surface) if name == "u_n" else surface.quantity(name) for name in self.quantities]
+        fields = [values[..., None] for values in fields]
         if self.arrow:
             fields.append(surface.u @ self.view.axes)
         return raster.sample(

@@ -71,8 +71,7 @@ def of_files(paths):
 
 
 def in_common(results):
-    """The results, whose units must be the same. Raises BadInput."""
+    """Raises BadInput unless the results have the same units."""
     for other in results[1:]:
         if other.units != results[0].units:
             raise BadInput(f"{results[0].path} and {other.path} have different units; --units none draws them without, as their files have them")
-    return results
