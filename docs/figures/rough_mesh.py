@@ -1,4 +1,4 @@
-"""Draws a triangle mesh beside the start that was made of it, both with the edges of their triangles.
+"""Draws a triangle mesh beside the initial shape that was made of it, both with the edges of their triangles.
 
 rough_mesh.py MESH.off RESULT.hdf -o PICTURE
 """
@@ -54,7 +54,7 @@ def draw(paths, outputs):
     left = (style.WIDTH - 2 * wide - GAP) / 2
     shown = (
         (f"the file: {len(corners)} triangles", corners, flat_normals(corners), 1),
-        (f"the start: {len(start.points)} curved triangles", start.points, start.normal, start.order),
+        (f"the initial shape: {len(start.points)} curved triangles", start.points, start.normal, start.order),
     )
     for column, (title, points, normals, order) in enumerate(shown):
         x = left + column * (wide + GAP)
