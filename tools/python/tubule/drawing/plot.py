@@ -13,7 +13,7 @@ from .cuts import CutPanel
 from .energy import BranchPanel, EnergyPanel
 from .labels import as_label, row_labels, sorted_by_value
 from .results import BadInput
-from .series import BalancePanel, Choice, SeriesPanel, has_balance
+from .series import BalancePanel, SeriesPanel, has_balance
 from .surfaces import SurfacePanel, choose_colours
 from .tubes import TubePanel, check_quantities, choose_columns
 
@@ -90,8 +90,7 @@ class Page:
 
     def panels(self):
         if self.options.series:
-            o = self.options
-            return [SeriesPanel(self.results, self.labels, Choice(o.series, o.x, o.low, o.high, o.logx, o.logy))]
+            return [SeriesPanel(self.results, self.labels, self.options)]
         return [*self.profiles(), *self.surfaces(), *self.series()]
 
 

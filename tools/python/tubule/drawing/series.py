@@ -2,7 +2,6 @@
 energy-balance residual and the estimated error against the logarithm of time."""
 
 import difflib
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -25,54 +24,42 @@ def units_of_series(results):
     return {name: result.unit(of) for result in results for name, of in result.dimensions.items()}
 
 
-@dataclass
-class Choice:
-    """What is drawn: the series `names` against the series `x`, where x is between `low` and `high` (None: no limit), numbers
-    of the file."""
+class SeriesPanel:
+    """A line for each result and each of `options.series`, against `options.x` where it is between `low` and `high`, numbers of
+    the file. Results differ by colour, series by dashes."""
 
-    names: list
-    x: str = "time"
-    low: float | None = None
-    high: float | None = None
-    logx: bool = False
-    logy: bool = False
+    def __init__(self, results, labels, options):
+        self.options, self.meanings, self.units = options, meanings(results), units_of_series(results)
+        self.dashes = dict(zip(options.series, ("-", *DASHES * len(options.series))))
+        self.lines = [[self._line(result, name) for name in options.series] for result in results]
+        handles = result_handles(labels)
+        if len(options.series) > 1:
+            handles += [Line2D([], [], color="0.3", linestyle=d, label=self._name(n)) for n, d in self.dashes.items()]
+        self.legend = Legend(handles)
+        self.height = HEIGHT + 0.62 + self.legend.below
 
-    def of(self, result, name):
+    def _line(self, result, name):
         """x and values of a result in the range; BadInput if there is nothing to draw."""
-        for wanted in (self.x, name):
+        o = self.options
+        for wanted in (o.x, name):
             if wanted not in result.series:
                 near = difflib.get_close_matches(wanted, result.series, 3, 0.5)
                 hint = f"; did you mean {' or '.join(near)}?" if near else ""
                 raise BadInput(f"{result.path}: has no series {wanted}; it has {', '.join(sorted(result.series)) or 'none'}{hint}")
-        x, y = result.series[self.x], result.series[name]
-        one = result.scale(result.dimensions.get(self.x, ""))
-        inside = (x >= (-np.inf if self.low is None else self.low * one)) & (x <= (np.inf if self.high is None else self.high * one))
+        x, y = result.series[o.x], result.series[name]
+        one = result.scale(result.dimensions.get(o.x, ""))
+        inside = (x >= (-np.inf if o.low is None else o.low * one)) & (x <= (np.inf if o.high is None else o.high * one))
         if not inside.any():
-            raise BadInput(f"{result.path}: no row has a {self.x} in the range; it goes from {number(x.min() / one)} to {number(x.max() / one)}")
-        if self.logx:
+            raise BadInput(f"{result.path}: no row has a {o.x} in the range; it goes from {number(x.min() / one)} to {number(x.max() / one)}")
+        if o.logx:
             inside &= x > 0
             if not inside.any():
-                raise BadInput(f"{result.path}: {self.x} is nowhere positive in the range, as --logx needs it")
-        if self.logy:
+                raise BadInput(f"{result.path}: {o.x} is nowhere positive in the range, as --logx needs it")
+        if o.logy:
             y = np.where(y > 0, y, np.nan)  # a gap
             if not np.isfinite(y[inside]).any():
                 raise BadInput(f"{result.path}: {name} is nowhere positive in the range, as --logy needs it")
         return x[inside], y[inside]
-
-
-class SeriesPanel:
-    """A line for each result and series; results differ by colour, series by dashes."""
-
-    def __init__(self, results, labels, choice):
-        self.labels, self.choice, self.meanings = labels, choice, meanings(results)
-        self.units = units_of_series(results)
-        self.lines = [[choice.of(result, name) for name in choice.names] for result in results]
-        names, dashes = choice.names, ("-", *DASHES * len(choice.names))
-        handles = result_handles(labels)
-        if len(names) > 1:
-            handles += [Line2D([], [], color="0.3", linestyle=d, label=self._name(n)) for n, d in zip(names, dashes)]
-        self.legend = Legend(handles)
-        self.height = HEIGHT + 0.62 + self.legend.below
 
     def _name(self, name):
         words = self.meanings.get(name, name)
@@ -80,17 +67,17 @@ class SeriesPanel:
 
     def draw(self, figure, bottom):
         """Draws the panel with its lower edge `bottom` inches above that of the figure."""
-        names, dashes = self.choice.names, ("-", *DASHES * len(self.choice.names))
         axes = axes_at(figure, 0.75, bottom + self.legend.below + 0.4, figure.get_figwidth() - 0.9 - self.legend.right, HEIGHT)
         for lines, colour in zip(self.lines, line_colours(len(self.lines))):
-            for (x, y), style in zip(lines, dashes):
-                axes.plot(x, y, color=colour, linestyle=style, marker="o" if x.size == 1 else "")
-        if self.choice.logx:
+            for (x, y), dashes in zip(lines, self.dashes.values()):
+                axes.plot(x, y, color=colour, linestyle=dashes, marker="o" if x.size == 1 else "")
+        if self.options.logx:
             axes.set_xscale("log")
-        if self.choice.logy:
+        if self.options.logy:
             axes.set_yscale("log")
         axes.margins(x=0)
-        axes.set(xlabel=self._name(self.choice.x), ylabel=self._name(names[0]) if len(names) == 1 else "")
+        names = self.options.series
+        axes.set(xlabel=self._name(self.options.x), ylabel=self._name(names[0]) if len(names) == 1 else "")
         self.legend.draw(axes, bottom)
 
 
