@@ -88,7 +88,7 @@ TEST(RestoredState, ofAGraph) {
     w.array("restart_breaks", s.breaks), w.array("restart_coefficients", s.coefficients);
     w.array("restart_error_total", s.error_total), w.array("restart_error_spatial", s.error_spatial);
     w.number("restart_dissipated", s.dissipated), w.number("restart_time_tolerance", s.time_tolerance);
-    w.number("restart_defect", s.defect), w.number("restart_error_max", s.error_max);
+    w.number("restart_defect", s.mesh_loss), w.number("restart_error_max", s.error_max);
     expect_holds(record, state);
 }
 
