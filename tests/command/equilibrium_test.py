@@ -99,6 +99,11 @@ class Equilibrium(ProgramTest):
         for mode in modes:
             exact = [one["rate"] for one in profile["slowest"] if one["m"] == mode["m"]]
             self.assertLess(min(abs(mode["rate"] / rate - 1) for rate in exact), 1e-2)
+        fluid = json.loads(self.tubule("stability", case, "--model", "fluid", "--Re", "10", "--json", "--rates", "2")[0])["modes"]
+        for mode in fluid:
+            self.assertEqual(mode["model"], "fluid")
+            self.assertLess(mode["rate"], 0)
+            self.assertGreater(mode["frequency"], mode["frequency_error"])
         self.assertIn("--kT does not apply", self.tubule("stability", case, "--kT", "1", status=2)[1])
 
     def begins_along_its_modes(self, cell, text):
