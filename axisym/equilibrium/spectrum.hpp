@@ -19,7 +19,7 @@ struct SpectrumSettings {
     std::optional<double> sigma;  // the tension: of a free area; or where the shape leaves it open (a tube, a sphere)
     double pressure = 0;          // of a free volume
     std::shared_ptr<const Formula> pressure_of_volume{};  // instead of the number
-    std::optional<double> force;                          // of a free period: what balances it
+    std::optional<double> force;  // of a free period: what balances it; of beads whose distance is not held
 };
 
 // The loads of a law at a time, where `held` leaves their partners free.

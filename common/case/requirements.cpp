@@ -162,7 +162,7 @@ const std::vector<Requirement> rows{
     key("model.tension", {free_area}, "what a fixed area needs is the series tension"),
     key("model.pressure", {free_volume}, "what a fixed volume needs is the series pressure"),
     key("model.force", {pulled}, "what a fixed period needs is the series force"),
-    key("model.bead_width", {named_tier, closed, named_model}, "beads pull at the poles"),
+    key("model.bead_width", {closed, named_model}, "beads pull at the poles"),
     key("model.extension", {beads}, "it is that of the distance of two beads"),
     value(
         "model.extension", [](P p) { return p.law.beads && p.law.beads->extension; }, {no_inertia},

@@ -191,6 +191,12 @@ time = {{end = {end}}}
         for before, after in both:
             self.assertAlmostEqual(before, after, delta=5e-3 * E_ref)
 
+    @study
+    def test_a_vesicle_between_beads(self):
+        both, E_ref = self.lose_axis(0.1115, 3, ", bead_width = 0.35, force = 0.5", "bead_distance", "free_energy")
+        self.assertAlmostEqual(*both[0], delta=1e-4)
+        self.assertAlmostEqual(*both[1], delta=1e-3 * E_ref)
+
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])

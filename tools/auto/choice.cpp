@@ -19,7 +19,8 @@ constexpr double few_reach = 1e-2, few_start = 5e-4;
 }  // namespace
 
 bool few_triangles_do(const Problem& c, const surface3d::Start& start) {
-    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order || c.surface_resolution_given())
+    if (c.accuracy.energy < few_reach || !start.resizable() || c.surface.order || c.surface_resolution_given() ||
+        c.law.beads)
         return false;
     const surface3d::StartMesh mesh = start.mesh(surface3d::least_triangles, c.element_order);
     const surface3d::Observables o = surface3d::observe_start(c, mesh);

@@ -56,7 +56,7 @@ axisym::Spectrum second_variation(const Problem& c, const MotionLaw& law, Held h
                                   axisym::SpectrumSettings settings) {
     constexpr double well_known = 1e-2, fine = 1e-10;  // the finest mesh: it lacks the least of the sum over all modes
     MotionLaw plain{.friction = 1, .inextensible = false, .keeps_volume = law.keeps_volume};
-    plain.free_period = law.free_period;
+    plain.free_period = law.free_period, plain.beads = law.beads;
     const int asked = settings.last;
     settings.first = 0, settings.last = std::max(asked, 2), settings.accuracy = fine;
     axisym::Spectrum out = axisym::spectrum(c.energy, plain, held, shape, settings);
