@@ -217,6 +217,27 @@ double SurfaceSystem::bead_coarseness(const Eigen::VectorXd& u) const {
     return beads_ ? surface3d::bead_coarseness(mesh(u), bead_numbers(u), beads_->width()).value : 0;
 }
 
+double SurfaceSystem::axial_force(const Eigen::VectorXd& u) const {
+    if (!(base_.period > 0)) return bead_force(u);
+    if (problem_.free_period) return problem_.loads.force;
+    const CurvedMesh at = mesh(u);
+    Bending membrane = bending(u);  // what acts at places does not stretch with the period, but is a tension
+    membrane.potentials.clear();
+    const EnergyDerivatives d =
+        energy_->derivatives(at, {directions_.normal, true}, membrane, u[sigma()], u[lambda()], H0_, false);
+    double sum = (d.energy + u[sigma()] * d.area + u[lambda()] * d.volume).tail<1>()[0];
+    const std::optional<Formula> W = potential_density_in_space(problem_.bending.potentials);
+    const Tabulation& table = space().tabulation();
+    for (int cell = 0; W && cell < space().cells(); ++cell) {
+        const CellColumns<3> X = cell_nodes(at, cell);
+        for (int q = 0; q < table.points(); ++q) {
+            const SurfacePoint<double> p = tangent_point(X, table, q);
+            sum += table.weight[q] * p.area * evaluate(*W, p.x.data()) * (1 - p.normal.z() * p.normal.z());
+        }
+    }
+    return sum / at.period;
+}
+
 double SurfaceSystem::length(const Eigen::VectorXd& u) const {
     return beads_ ? BeadEquations::distance(bead_numbers(u)) : mesh(u).period;
 }

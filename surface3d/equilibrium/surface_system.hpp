@@ -14,7 +14,7 @@
 
 namespace tubule::surface3d {
 
-// The beads of a surface, zeros without any.
+// The beads of a surface, zeros without any; of a tube the force that holds its period.
 struct BeadState {
     BeadNumbers numbers = BeadNumbers::Zero();
     double force = 0, coarseness = 0;  // see fem/places.hpp
@@ -59,8 +59,10 @@ public:
     // The longest edge near a bead, over the width of its weight and the order: how far apart nodes are there.
     double bead_coarseness(const Eigen::VectorXd& u) const;
     double bead_force(const Eigen::VectorXd& u) const { return beads_ ? beads_->force(on(u), bead_numbers(u)) : 0; }
+    // Between beads, or dE/dL of a tube with its multipliers; theory.md (3.19).
+    double axial_force(const Eigen::VectorXd& u) const;
     BeadState bead_state(const Eigen::VectorXd& u) const {
-        return {bead_numbers(u), bead_force(u), bead_coarseness(u)};
+        return {bead_numbers(u), axial_force(u), bead_coarseness(u)};
     }
     double reference_energy(const Eigen::VectorXd& u) const;
     bool admissible(const Eigen::VectorXd& u) const;

@@ -104,9 +104,9 @@ SeriesTable<Row> shape_series(const Problem& c) {
         table.add({{"potential_energy", [](const Row& r) { return r.shape.values.potential; }},
                    {"potential_force", [](const Row& r) { return r.shape.values.potential_force; }}});
     add_extents(table);
-    if (c.law.beads)
-        table.add({{"force", [](const Row& r) { return r.shape.beads.force; }},
-                   {"bead_distance", [](const Row& r) { return r.extents.length; }}});
+    if (c.law.beads || may_have_period(c.shape))
+        table.add({{"force", [](const Row& r) { return r.shape.beads.force; }}});
+    if (c.law.beads) table.add({{"bead_distance", [](const Row& r) { return r.extents.length; }}});
     table.add({{"negative_directions", [](const Row& r) { return static_cast<double>(r.point.index); }}});
     add_rates(c, table);
     table.add({{"height", [](const Row& r) { return r.height; }},

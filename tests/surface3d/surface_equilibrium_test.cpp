@@ -221,6 +221,7 @@ TEST(SurfaceSpectrum, tubeInAField) {
     const Eigen::VectorXd u = stationary(round);
     const double E = 2 * pi * length * (0.5 / R + 0.3 * R * R * R);
     EXPECT_NEAR(round.values(u).energy, E, 1e-5 * E);
+    EXPECT_NEAR(round.axial_force(u), E / length, 1e-4 * E);
     std::vector<double> expected;
     for (int m = 0; m <= 3; ++m)
         for (int n = 0; n <= 2; ++n)
