@@ -243,14 +243,14 @@ TEST(MotionSettings, SmoothnessIsTheOrderOfLinearInterpolation) {
 
 TEST(MotionSettings, OnlyWhatIsTooInaccurateIsRefined) {
     const MotionSettings s{.elements = 400, .tolerance = 1e-7};
-    const MotionSettings mesh = finer(s, 1e-5, {.energy = 2e-5, .in_time = 1e-6, .defect = 0});
+    const MotionSettings mesh = finer(s, 1e-5, {.energy = 2e-5, .in_time = 1e-6, .imbalance = 0});
     EXPECT_GT(mesh.elements, s.elements);
     EXPECT_EQ(mesh.tolerance, s.tolerance);
-    const MotionSettings steps = finer(s, 1e-5, {.energy = 2e-5, .in_time = 1.9e-5, .defect = 0});
+    const MotionSettings steps = finer(s, 1e-5, {.energy = 2e-5, .in_time = 1.9e-5, .imbalance = 0});
     EXPECT_EQ(steps.elements, s.elements);
     EXPECT_LT(steps.tolerance, s.tolerance);
     // Not known apart: both.
-    const MotionSettings both = finer(s, 1e-5, {.energy = 2e-5, .in_time = {}, .defect = 0});
+    const MotionSettings both = finer(s, 1e-5, {.energy = 2e-5, .in_time = {}, .imbalance = 0});
     EXPECT_GT(both.elements, s.elements);
     EXPECT_LT(both.tolerance, s.tolerance);
 }
