@@ -392,4 +392,5 @@ def main(description, draw, argument="table", nargs=None):
         parser.add_argument(argument, nargs=nargs)
     parser.add_argument("-o", "--output", action="append", required=True)
     options = parser.parse_args()
-    return run(lambda outputs: draw(argument and getattr(options, argument), outputs), options.output, argument and os.path.relpath)
+    given = argument and getattr(options, argument)
+    return run(lambda outputs: draw(given, outputs), options.output, argument and os.path.relpath)

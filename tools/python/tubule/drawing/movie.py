@@ -44,7 +44,8 @@ def as_surface(frame, name):
 
     def turned(radial, axial):
         """Vectors at the nodes of the cells."""
-        around = np.stack([np.outer(radial, np.cos(angle)), np.outer(radial, np.sin(angle)), np.outer(axial, np.ones(angle.size))], axis=-1)
+        around = np.stack([np.outer(radial, np.cos(angle)), np.outer(radial, np.sin(angle)),
+                           np.outer(axial, np.ones(angle.size))], axis=-1)  # fmt: skip
         return around.reshape(-1, 3)[cells]
 
     poles = max(frame.r[0], frame.r[-1]) < 1e-6 * frame.r.max()

@@ -354,7 +354,8 @@ def _surface(path, name, record, meshes):
     order, period = int(mesh.attrs["order"]), float(mesh.attrs["period"])
     cells = values(record["Connectivity"]).reshape(-1, (order + 1) * (order + 2) // 2)
     points = _arrays(path, name, record, ("Points",))["Points"]
-    others = ("u", "u_n", "p", "H0", "energy_density", *sorted(key for key in record["PointData"] if key.startswith("mode_")))
+    modes = sorted(key for key in record["PointData"] if key.startswith("mode_"))
+    others = ("u", "u_n", "p", "H0", "energy_density", *modes)
     nodes = _arrays(path, name, record["PointData"], ("H", "K", "normal"), others)
     if any(a.shape != (points.shape if key in ("normal", "u") else points.shape[:1]) for key, a in nodes.items()):
         names = ", ".join(["Points", "normal", *(key for key in nodes if key != "normal")])
@@ -362,7 +363,7 @@ def _surface(path, name, record, meshes):
     if ("u" in nodes) != ("u_n" in nodes):
         raise BadInput(f"{path}: frame {name}: has only one of u and u_n")
     of_cells = {key: array[cells] for key, array in {"points": points, **nodes}.items()}
-    modes = {key: of_cells.pop(key) for key in nodes if key.startswith("mode_")}
+    modes = {key: of_cells.pop(key) for key in modes}
     if period > 0:
         join_periods(of_cells["points"], period)
     nodes |= {"points": points, "node": values(mesh["point_node"]) if period > 0 else np.arange(len(points))}

@@ -205,7 +205,9 @@ class Scan:
         for axis in self.axes:
             axis.unit, axis.scale = self.unit_of_key(axis.key)
             axis.values = axis.values * axis.scale if axis.is_numeric else axis.values
-        self.points |= {name: data * self.unit_of(name)[1] for name, data in self.points.items() if self.unit_of(name)[0]}
+        for name in self.points:
+            if self.unit_of(name)[0]:
+                self.points[name] = self.points[name] * self.unit_of(name)[1]
         return self
 
     def unit_of_key(self, key):
@@ -268,7 +270,8 @@ class Scan:
 def differing(outcome):
     """Pairs of neighbours whose outcomes differ, by their numbers."""
     for axis in range(outcome.ndim):
-        pairs = np.stack([np.delete(np.arange(outcome.size).reshape(outcome.shape), end, axis).ravel() for end in (-1, 0)], axis=1)
+        numbers = np.arange(outcome.size).reshape(outcome.shape)
+        pairs = np.stack([np.delete(numbers, end, axis).ravel() for end in (-1, 0)], axis=1)
         a, b = outcome.ravel()[pairs].T
         yield from pairs[(a != b) & (a > 0) & (b > 0)]
 
@@ -367,7 +370,8 @@ def draw_borders(part, panel):
             lines.append([(x[i + 1], y[j]), (x[i + 1], y[j + 1])] if k > i else [(x[i], y[j + 1]), (x[i + 1], y[j + 1])])
         if len(part.crossings):
             value = part.crossings[number]
-            places.append((part.axes[0].at(value), part.axes[1].values[j]) if k > i else (part.axes[0].values[i], part.axes[1].at(value)))
+            first, second = part.axes
+            places.append((first.at(value), second.values[j]) if k > i else (first.values[i], second.at(value)))
     panel.add_collection(LineCollection(lines, colors="black", linewidths=0.8))
     handles = draw_equal_energies(part, panel)
     if places:
@@ -467,7 +471,9 @@ def draw_confirmed(path, part, panel):
 def read(path, option=""):
     """The scan in a file, in the units of its case if it has any; `option` as --units."""
     scan = Scan(path)
-    return scan.convert(lambda sets: units.asked(path, option, sets)) if units.are_wanted(option, scan.has_units) else scan
+    if not units.are_wanted(option, scan.has_units):
+        return scan
+    return scan.convert(lambda sets: units.asked(path, option, sets))
 
 
 def figure_of(scan, quantity, slices, confirmed=None):

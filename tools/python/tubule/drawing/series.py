@@ -25,8 +25,8 @@ def units_of_series(results):
 
 
 class SeriesPanel:
-    """A line for each result and each of `options.series`, against `options.x` where it is between `low` and `high`, numbers of
-    the file. Results differ by colour, series by dashes."""
+    """A line for each result and each of `options.series`, against `options.x` where it is between `low` and `high`,
+    numbers of the file. Results differ by colour, series by dashes."""
 
     def __init__(self, results, labels, options):
         self.options, self.meanings, self.units = options, meanings(results), units_of_series(results)

@@ -31,8 +31,8 @@ def choose_colours(results, wanted):
 
 
 def quantities(names, results, surfaces, of):
-    """Names and colours, whose scales all surfaces share; of the normal velocity relative to its largest value, which is that
-    `of` the run or the shape."""
+    """Names and colours, whose scales all surfaces share; of the normal velocity relative to its largest value, which is
+    that `of` the run or the shape."""
     areas = [node_areas(surface).ravel() for surface in surfaces]
     for name in names:
         if name == "u_n":

@@ -129,9 +129,9 @@ def ring_areas(frame):
 
 
 class ShapesPanel:
-    """A row of shapes for each result, a column for each time, bars of their colours below. Sizes everything in inches first, so
-    that the figure can be made to fit; then draws. What a shape covers, how it is drawn, by which scales() of colours, and what
-    is written below it is defined by derived classes."""
+    """A row of shapes for each result, a column for each time, bars of their colours below. Sizes everything in inches
+    first, so that the figure can be made to fit; then draws. What a shape covers, how it is drawn, by which scales() of
+    colours, and what is written below it is defined by derived classes."""
 
     MARGIN = 0.0  # inches of margin around a shape
     COLUMN_GAP, LABEL_WIDTH, SLACK = 0.14, 16, 0.5
@@ -148,7 +148,8 @@ class ShapesPanel:
         self.shapes = [shape for column in columns for shape in column.cells if shape]
         self.left = (0.45 if self.pictures > 1 else 0.2) + 0.062 * max(len(line) for label in self.labels for line in label.split("\n"))
         self.titles = [self._title(index, column) for index, column in enumerate(columns)]
-        self.captions = [["\n".join(filter(None, self._words(column, row))) for column in columns] for row in range(len(results))]
+        self.captions = [["\n".join(filter(None, self._words(column, row))) for column in columns]
+                         for row in range(len(results))]  # fmt: skip
         below = [max(0.16 * text.count("\n") + 0.14 * bool(text) for text in row) for row in self.captions]
 
         sizes = np.array([[self._size(shape) if shape else (0, 0) for shape in column.cells] for column in columns])

@@ -23,13 +23,14 @@ OF_RUNS = {"stop_time": "time", "E_ref": "energy"}
 
 
 def asked(path, option="", sets=()):
-    """The units of a result or scan by their dimensions, {"time": {"scale": 91, "unit": "us"}, ...}, as `tubule units --json` has
-    them. `option` as --units; `sets` override its case."""
+    """The units of a result or scan by their dimensions, {"time": {"scale": 91, "unit": "us"}, ...}, as `tubule units
+    --json` has them. `option` as --units; `sets` override its case."""
     program = os.environ.get("TUBULE_PROGRAM")
     if not program:
         raise BadInput("--units: TUBULE_PROGRAM must name the program tubule")
     every = [*sets, *(f"units.{part}" for part in option.split(",") if part)]
-    done = subprocess.run([program, "units", path, "--json", *(f"--set={one}" for one in every)], capture_output=True, text=True)
+    command = [program, "units", path, "--json", *(f"--set={one}" for one in every)]
+    done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise BadInput(done.stderr.strip())
     return json.loads(done.stdout)["units"]
@@ -46,7 +47,8 @@ def convert(result, units):
             if getattr(frame, name, None) is not None:
                 setattr(frame, name, getattr(frame, name) * result.scale(of))
     for surface in result.surfaces:
-        surface.nodes |= {name: surface.nodes[name] * result.scale(OF_FRAMES[name]) for name in OF_FRAMES.keys() & surface.nodes}
+        for name in OF_FRAMES.keys() & surface.nodes:
+            surface.nodes[name] = surface.nodes[name] * result.scale(OF_FRAMES[name])
     return result
 
 
