@@ -504,11 +504,17 @@ SurfaceSpectrum slowest_of_fluid(const FlowForm& flow, int count, double scale) 
     }
     const InvertedFluid inverse(flow, *factors, scale);
     const Eigen::MatrixXd z = span_of_modes(inverse, count, scale);
-    const ComplexEigenpairs found = inverse.rates_on(z);
+    ComplexEigenpairs found = inverse.rates_on(z);
     std::vector<Eigen::Index> order;
-    for (Eigen::Index j = 0; j < z.cols(); ++j)
-        if (found.values[j].imag() >= 0) order.push_back(j);
-    count = static_cast<int>(std::min<std::size_t>(order.size(), count));
+    for (Eigen::Index j = 0; j < z.cols(); ++j) {
+        std::complex<double>& s = found.values[j];
+        if (std::abs(s.imag()) < 1e-6 * std::abs(s)) {  // rounding makes a pair of a double value
+            if (s.imag() < 0) found.vectors.col(j) *= std::complex<double>(0, 1);
+            s = s.real();
+        }
+        if (s.imag() >= 0) order.push_back(j);
+    }
+    if (static_cast<int>(order.size()) < count) throw SolveError("the slowest modes of the fluid were not found");
     std::sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
         const std::complex<double> s = found.values[a], t = found.values[b];
         return std::pair(-s.real(), s.imag()) < std::pair(-t.real(), t.imag());
@@ -522,7 +528,7 @@ SurfaceSpectrum slowest_of_fluid(const FlowForm& flow, int count, double scale) 
         Eigen::VectorXcd w = z.topRows(flow.size) * found.vectors.col(order[i]);
         Eigen::Index largest = 0;
         w.cwiseAbs().maxCoeff(&largest);
-        w *= std::abs(w[largest]) / w[largest];
+        if (s.imag() > 0) w *= std::abs(w[largest]) / w[largest];
         out.vectors.col(i) = w.real();
     }
     return out;

