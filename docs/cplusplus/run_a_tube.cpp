@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
         Watch watch(writer, series);
         const RunSummary run = axisym::run_profile(c, watch);
         writer.finish({{"stop", std::string(name(run.stop.reason))}});
-        std::printf("%s: %s\nenergy %.6f, error at most %.1e of E_ref = %.4f\n",
+        std::printf("%s: %s\nenergy %.6f, estimated error %.1e of E_ref = %.4f\n",
                     std::string(name(run.stop.reason)).c_str(), run.stop.message.c_str(), run.energy,
                     run.estimated_error, run.reference_energy);
     } catch (const CaseError& error) {

@@ -47,7 +47,7 @@ class Units(ProgramTest):
         ):
             self.assertEqual(shown[of][1], name)
             self.expect_printed(form, shown[of][0])
-        self.expect_printed(r"the tension \$\\kappa/\(2R\^2\) = ([\d.]+)\\thinspace\\mu\\mathrm{N/m}", shown["energy/length^2"][0] / 2)
+        self.expect_printed(r"the tension \$\\kappa/\(2R\^2\) =\s+([\d.]+)\\thinspace\\mu\\mathrm{N/m}", shown["energy/length^2"][0] / 2)
         self.assertEqual(shown["energy"], (20.0, "kT"))
         # What the physical quantities make of the numbers of the model
         water = 0.89e-3 / 50e-9
@@ -64,8 +64,8 @@ class Units(ProgramTest):
         q, rate, e_fold = re.search(r"^ +0 +(\S+) +(\S+) +(\S+)$", words, re.M).groups()
         self.assertIn("            1/nm           1/us           us", words)
         self.assertEqual(float(q), 2 / 50)
-        self.expect_printed(r"rate \$\\omega = -([\d.]+)", -float(rate) * shown["time"][0])
-        self.expect_printed(r"T/2.319 = ([\d.]+)\\thinspace", float(e_fold))
+        self.expect_printed(r"decays within \$T/([\d.]+)", -float(rate) * shown["time"][0])
+        self.expect_printed(r"T/2.319 =\s+([\d.]+)\\thinspace", float(e_fold))
 
     def test_table(self):
         out, _ = self.tubule("units", CASE)

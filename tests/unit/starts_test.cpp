@@ -160,7 +160,7 @@ TEST_F(ProfileFiles, AreRefusedWithTheirLine) {
     // A corner is no smooth curve.
     std::string cone;
     for (int i = 0; i <= 10; ++i) cone += fmt::format("{},{}\n", 0.1 * std::min(i, 10 - i), 0.1 * i);
-    EXPECT_CONTAINS(refusal(cone, within(1e-6)), "set shape.tolerance to that");
+    EXPECT_CONTAINS(refusal(cone, within(1e-6)), "set shape.tolerance to 0.029");
 }
 
 // ---- H0 of each point

@@ -12,6 +12,7 @@ import os
 import sys
 import time
 import tomllib
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -169,7 +170,8 @@ class Program:
             print(f"  {label} ...", end="", flush=True)
             begun = time.process_time()
             try:
-                result = self.tubule.run(case, output=path, overwrite=True, threads=1)
+                with warnings.catch_warnings(action="ignore"):  # of errors that are not asked for
+                    result = self.tubule.run(case, output=path, overwrite=True, threads=1)
             except (ValueError, RuntimeError) as error:
                 raise Failed(f"{label}: {error}") from error
             if result.stop not in ("finished", "stationary"):

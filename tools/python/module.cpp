@@ -241,7 +241,8 @@ Results run(const Problem& c, const py::object& progress, const py::object& outp
     Result done = without_gil(threads, [&] { return run_in_memory(c, options); });
     if (raised) std::rethrow_exception(raised);
     if (const auto* warnings = find_value<std::string>(done.about, "warnings"))
-        for (const std::string& words : split(*warnings, '\n')) notes.push_back(words);
+        for (const std::string& words : split(*warnings, '\n'))
+            if (!words.empty()) notes.push_back(words);
     for (const std::string& words : notes)
         py::module_::import("warnings").attr("warn")(words, py::handle(PyExc_UserWarning), 2);
     return {std::make_shared<const Result>(std::move(done))};
