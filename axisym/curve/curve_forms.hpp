@@ -92,8 +92,8 @@ public:
 
     // r > 0, |X'| > 0 and the energy defined at all quadrature points, none of them behind a wall.
     bool admissible(const Eigen::VectorXd& x) const;
-    // `mesh_loss`, if given, receives for each element the energy lost to the spline there: half the second variation
-    // of the best approximation error of the normal displacement, from the jumps of the highest derivatives.
+    // `mesh_loss`, if given, receives for each element the energy lost to the spline there: half the second variation,
+    // its direction being the best approximation error along the normal, from the jumps of the highest derivatives.
     CurveObservation observe(const Eigen::VectorXd& x, std::vector<double>* mesh_loss = nullptr) const;
     // E_ref, the scale that the required accuracy refers to: theory.md (11.1).
     double reference_energy(const Eigen::VectorXd& x) const;

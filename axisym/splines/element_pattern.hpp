@@ -20,7 +20,7 @@ struct ElementPattern {
     std::vector<int> slots;  // of the local matrices, column by column: places in its values; 0 for what is absent
 };
 
-// Of `size` unknowns; those in `full` have all entries of their rows and columns.
+// The pattern of `size` unknowns; those in `full` have all entries of their rows and columns.
 template <class Dofs>
 ElementPattern element_pattern(int size, int elements, const Dofs& dofs, const std::vector<int>& full = {}) {
     std::vector<Eigen::Triplet<double>> entries;

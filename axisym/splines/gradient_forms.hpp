@@ -12,7 +12,7 @@
 
 namespace tubule::axisym {
 
-// Of curves with the fields r and z of a CurveSpace, or of graphs r(z) of a SplineSpace.
+// For curves with the fields r and z of a CurveSpace, or graphs r(z) of a SplineSpace.
 template <class Space>
 class GradientForms {
 public:

@@ -50,8 +50,8 @@ private:
     std::vector<std::pair<std::string, std::function<double(const Row&)>>> columns_;
 };
 
-// The energy and those of its parts that belong to the surface alone; `of`, which captures nothing, gives the integrals
-// of a row, with these names as members.
+// The energy and those of its parts that belong to the surface alone. From a row, `of`, which captures nothing, gives
+// the integrals with these names as members.
 template <class Row, class Of>
 void add_energies(SeriesTable<Row>& table, const Bending& energy, const Of& /*of*/) {
     table.add({{"energy", [](const Row& r) -> double { return Of{}(r).energy; }}});

@@ -243,7 +243,7 @@ public:
         return std::abs(elastic) > (1 - 1e-2) * kinetic;
     }
     // Rates on what the columns z span, which are left eigenvectors, too, once w is multiplied by A and u by -inertia:
-    // of the second order in the errors of z. Vectors are coefficients of the columns.
+    // their errors are of second order in those of z. Vectors are coefficients of the columns.
     ComplexEigenpairs rates_on(const Eigen::MatrixXd& z) const {
         const Eigen::Index n = z.cols();
         Eigen::MatrixXd w(all_, n), Aw(all_, n);

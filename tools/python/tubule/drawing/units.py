@@ -11,7 +11,7 @@ OF_FRAMES = {
     "u": "length/time", "u_n": "length/time", "u_t": "length/time", "u_theta": "length/time", "p": "energy/length^2",
     "energy_density": "energy/length^2", "H0": "1/length",
 }  # fmt: skip
-# Of keys of a case, as far as branches and scans vary them.
+# Keys of a case, as far as branches and scans vary them.
 OF_KEYS = {
     "energy.k20": "energy", "energy.H0": "1/length", "energy.alpha": "energy/length^2", "energy.M0": "length",
     "energy.potential.0.strength": "energy/length^2", "equilibrium.area": "length^2", "equilibrium.volume": "length^3",
