@@ -94,10 +94,8 @@ void SurfaceSimulation::begin(const Start& from) {
     const VectorField u = start_velocity(case_, start);
     state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped(), {}, begin_time())
                           : surface().start(start.mesh, begin_time());
-    const bool moves = surface().law().inertia == 0 && traits().controls_steps;
-    if (moves) set_moving();
-    measure_state();
-    if (moves && is_reported() && !is_rough(now_.smoothness)) now_.dissipation = initial_dissipation();
+    if (moves_from_the_first()) set_moving();
+    measure_first_state();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     if (companions_) memory_.error = std::max(memory_.error, companions_->begin(summary.elements, now_));
     update_error();  // the begin time is compared, too
@@ -110,6 +108,15 @@ double SurfaceSimulation::first_step_from(double by_error) const {
     if (!case_.surface.step) return by_error;
     const double step = *case_.surface.step, share = std::min(step / (case_.time.end - begin_time()), 1.0);
     return is_of_high_order(case_) ? step * std::pow(share, 1.5) : step;
+}
+
+bool SurfaceSimulation::moves_from_the_first() const {
+    return case_.law.inertia == 0 && traits().controls_steps;
+}
+
+void SurfaceSimulation::measure_first_state() {
+    measure_state();
+    if (moves_from_the_first() && is_reported() && !is_rough(now_.smoothness)) now_.dissipation = initial_dissipation();
 }
 
 // Without inertia the surface moves from t = 0 on: takes the velocity of a very short step, against which the error of
@@ -128,7 +135,7 @@ void SurfaceSimulation::set_moving() {
 // Initial dissipation. Short steps show the noise of the force, longer implicit steps damp it. Steps tau, 4 tau, 16 tau
 // ...: each pair is extrapolated to tau = 0; the pair that changes least from the one before counts (below 0.5 %:
 // enough; all above 10 %: the last).
-double SurfaceSimulation::initial_dissipation() const {
+double SurfaceSimulation::initial_dissipation() {
     constexpr double enough = 0.005, much = 0.1;
     constexpr int most_trials = 6;
     const auto after = [&](double tau) {
@@ -146,8 +153,9 @@ double SurfaceSimulation::initial_dissipation() const {
             if (change < least_change || least_change > much) best = extrapolated, least_change = change;
             before = extrapolated, of_step = of_longer;
         }
-    } catch (const SolveError&) {  // the first step says why
-    } catch (const Paused&) {      // once there is a state to save
+    } catch (const SolveError&) {    // the first step says why
+    } catch (const Paused& pause) {  // the initial row is written; a run that resumes from it computes this again
+        initial_stop_ = pause_report(pause, state_.time);
     }
     return best;
 }
@@ -160,7 +168,10 @@ void SurfaceSimulation::resume(const Restart& restart, const Start& start) {
     summary.reference_energy = memory_.scale.reference_energy;
     use_mesh(frame_surface(restart.record, restart.cells.value()));
     state_ = std::move(state);
-    measure_state();
+    if (memory_.count.steps > 0)
+        measure_state();
+    else
+        measure_first_state();
     if (companions_) companions_->resume(restart.record, summary.elements);
 }
 

@@ -74,10 +74,12 @@ private:
 
     // The initial shape.
     void use_mesh(const CurvedMesh& mesh);
+    bool moves_from_the_first() const;
     void set_moving();
     double first_step_from(double by_error) const;
-    double initial_dissipation() const;
+    double initial_dissipation();
     void measure_state();
+    void measure_first_state();
 
     // A step.
     std::optional<Refusal> try_step(double tau);

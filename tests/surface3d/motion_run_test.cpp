@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "common/case/read.hpp"
@@ -718,6 +720,38 @@ TEST(MotionRun, InterruptedAnywhereItEndsAsUndisturbed) {
     EXPECT_EQ(watch.rows.size(), undisturbed.rows.size());
     EXPECT_EQ(s.energy, whole.energy);  // bit for bit
     EXPECT_EQ(s.estimated_error, whole.estimated_error);
+}
+
+// Interrupted for so long that a step is given up.
+struct ImpatientWatch : Watch {
+    int looks_before_rows = 0;
+    bool interrupted() override {
+        if (++looks <= most_looks) return false;
+        if (looks == most_looks + 2) std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        return true;
+    }
+    void row(std::span<const double> row) override {
+        if (rows.empty()) looks_before_rows = looks;
+        Watch::row(row);
+    }
+};
+
+// The last thing before the first row is the initial dissipation, which enters the balance.
+TEST(MotionRun, InterruptedBeforeItsFirstStepItHasTheSameBalance) {
+    const std::vector<std::string> sets{"time.end=1e-4", "discretisation.order=2", "accuracy.estimate=false"};
+    const Outcome whole = run_case(wavy, sets);
+    ImpatientWatch undisturbed, first;
+    run_surface(whole.c, undisturbed);
+    first.most_looks = undisturbed.looks_before_rows - 3;
+    const StopReport stop = run_surface(whole.c, first).stop;
+    ASSERT_EQ(stop.reason, Stop::interrupted);
+    ASSERT_EQ(stop.time, 0);
+    ASSERT_EQ(first.rows.size(), 1u);
+    Outcome second = begin(wavy, sets);
+    const Restart restart{first.frames.back(), first.meshes.at(*first.frames.back().mesh)};
+    second.summary = run_surface(second.c, second.watch, &restart);
+    EXPECT_EQ(second.summary.stop.reason, Stop::finished);
+    EXPECT_EQ(second.last("identity_defect"), whole.last("identity_defect"));  // bit for bit
 }
 
 TEST(MotionRun, NothingIsRefinedThatNoMeshCures) {
