@@ -194,7 +194,9 @@ private:
 
     void record(Point p, int index) {
         p.index = index;
-        repeated_ = is_known(p) ? repeated_ + 1 : 0;
+        const bool with_last =
+            !branch_.points.empty() && std::abs(p.parameter - branch_.points.back().parameter) < 1e-6 * range_;
+        if (!with_last) repeated_ = is_known(p) ? repeated_ + 1 : 0;
         branch_.points.push_back(std::move(p));
         settings_.found(branch_.points.back());
     }

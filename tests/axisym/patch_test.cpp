@@ -167,6 +167,9 @@ TEST(Patches, filmsAreCatenoids) {
         EXPECT_NEAR(o["parameter"][i], 1.3254868, 1e-6);
     }
     EXPECT_EQ(folds, 1);
+    EXPECT_EQ(o.summary.stop.message,
+              "the branch turned at the fold at 1.32549 and ended at the parameter 1: it did not reach 1.5");
+    EXPECT_EQ(o.summary.warnings, std::vector<std::string>{o.summary.stop.message});
 }
 
 // A tether from a clamped flat patch of radius 20, kappa = 1, tension 1/2: the force 2 pi sqrt(2 kappa sigma) at the

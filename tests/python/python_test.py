@@ -651,10 +651,28 @@ class Drawing(Folder):
             values, found = result.in_units(name)
             self.assertEqual(found, unit)
             np.testing.assert_allclose(values, scale * result.series[name])
+        values, found = result.in_units("r_min", "um")
+        self.assertEqual(found, "um")
+        np.testing.assert_allclose(values, 0.05 * result.series["r_min"])
+        for name, unit in (("r_min", "pN"), ("energy", "J"), ("order", "nm")):
+            with self.assertRaisesRegex(ValueError, f"{name} is in .*, which is not {unit} with another prefix"):
+                result.in_units(name, unit)
         axes = tubule.draw(result, kind="energy", units="length=2 um").axes[0]
         self.assertEqual(axes.get_xlabel(), "time t (initial phase) [s]")
         self.assertEqual(tubule.draw(result, kind="energy", units="none").axes[0].get_xlabel(), "time t (initial phase)")
         self.assertEqual(tubule.run(TUBE).units, {})
+
+    def test_notes_and_warnings_are_warnings_of_python(self):
+        bowl = {"tier": "axisym", "energy": {"k20": 1, "H0": 0.5}, "shape": {"kind": "ellipsoid", "a": 1, "b": 1, "c": 1.2},
+                "accuracy": {"energy": 0.1}, "time": {"end": 1e-3}}  # fmt: skip
+        with self.assertWarnsRegex(UserWarning, "energy.H0 = 0.5 is positive, but H is negative where"):
+            result = tubule.run(bowl)
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            result = tubule.run(bowl)
+        self.assertTrue(result.warnings)
+        self.assertLessEqual(set(result.warnings), {str(one.message) for one in seen})
+        self.assertIn(f", {len(result.warnings)} warning", repr(result))
 
     def test_surfaces(self):
         self.same(SURFACE, kind="cuts")
