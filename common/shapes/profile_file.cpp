@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "common/geometry/profile_point.hpp"
+#include "common/solve/dense.hpp"
 
 namespace tubule {
 namespace {
@@ -320,7 +321,7 @@ Eigen::VectorXd least_squares(const Basis& basis, const std::vector<double>& s, 
     }
     Eigen::MatrixXd normal = rows.transpose() * rows;
     normal.diagonal().array() *= 1 + 1e-13;  // points may leave gaps
-    return normal.ldlt().solve(rows.transpose() * values);
+    return solve_dense(normal, rows.transpose() * values);
 }
 
 // A curve by the coefficients of r and z.

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 
+#include "common/solve/dense.hpp"
 #include "common/solve/parallel.hpp"
 
 namespace tubule {
@@ -95,7 +96,7 @@ BorderedSolver::Answer BorderedSolver::directly(const Eigen::SparseMatrix<double
     if (C.cols() == 0) return {x, {}};
     const Eigen::MatrixXd W = lu_->solve(C, 1);
     const Eigen::MatrixXd S = R.transpose() * W - D;
-    const Eigen::VectorXd y = S.partialPivLu().solve(R.transpose() * x - d);
+    const Eigen::VectorXd y = solve_dense(S, R.transpose() * x - d);
     return {x - W * y, y};
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/solve/dense.hpp"
+
 namespace tubule::surface3d {
 namespace {
 
@@ -35,7 +37,7 @@ Eigen::MatrixXd bernstein_from_nodes(int order) {
             for (int c = 0; c < 3; ++c) value *= std::pow(static_cast<double>(nodes[row][c]) / order, power[c]);
             values(row, number_of(j, m)) = value;
         }
-    return values.inverse();
+    return solve_dense(values, Eigen::MatrixXd::Identity(n, n));
 }
 
 // The part of a segment, 0 ... 1, that is nearest to x.

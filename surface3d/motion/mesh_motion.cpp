@@ -1,8 +1,9 @@
 #include "surface3d/motion/mesh_motion.hpp"
 
-#include <Eigen/LU>
 #include <array>
 #include <cmath>
+
+#include "common/solve/dense.hpp"
 
 namespace tubule::surface3d {
 namespace {
@@ -87,7 +88,7 @@ Eigen::Vector3d translation(const System& system, const VectorField& normal, con
     for (int d = 0; d < free; ++d) of_unit.col(d) = system.flux[d] * Eigen::VectorXd::Ones(flux.size());
     const Eigen::MatrixXd across = normal.topRows(free);
     Eigen::Vector3d out = Eigen::Vector3d::Zero();
-    out.head(free) = (across * of_unit).partialPivLu().solve(across * flux);
+    out.head(free) = solve_dense(across * of_unit, across * flux);
     return out;
 }
 

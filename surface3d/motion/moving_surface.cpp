@@ -251,7 +251,7 @@ void MovingSurface::keep_momenta(const Eigen::VectorXd& kept, double te, MotionS
     const CurvedMesh m = mesh(to);
     const Eigen::MatrixXd motions = rigid_motions(m), of = momenta(m);
     const Eigen::VectorXd lack = kept - of.transpose() * to.u;
-    const Eigen::VectorXd back = motions * (motions.transpose() * of).ldlt().solve(lack);
+    const Eigen::VectorXd back = motions * solve_dense(motions.transpose() * of, lack);
     to.u += back;
     const VectorField nodal = back.reshaped(nodes(), 3).transpose();
     to.w += nodal;

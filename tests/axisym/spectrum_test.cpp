@@ -14,6 +14,7 @@
 #include "axisym/splines/breaks.hpp"
 #include "common/case/read.hpp"
 #include "common/result/frame_profile.hpp"
+#include "common/solve/dense.hpp"
 #include "common/theory/dispersion.hpp"
 #include "common/theory/growth_fit.hpp"
 #include "common/theory/waves.hpp"
@@ -48,7 +49,7 @@ TEST(Dispersion, theGraphsLinearisedOperator) {
         Eigen::SparseMatrix<double> J = forms.pattern();
         forms.jacobian(x.data(), rate.data(), 0, J.valuePtr());
         const Eigen::MatrixXd A = J, M = forms.mass(x);
-        const Eigen::VectorXcd found = -Eigen::PartialPivLU<Eigen::MatrixXd>(M).solve(A).eigenvalues();
+        const Eigen::VectorXcd found = general_eigenpairs(-solve_dense(M, A))->values;
         for (int n = 0; n <= 5; ++n) {
             const double q = 2 * pi * n / length, s = growth(tube, law_of(ModelKind::gradient_flow), q, 0).rate();
             std::vector<double> distance;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "common/solve/dense.hpp"
 #include "surface3d/import/import_mesh.hpp"
 #include "surface3d/mesh/curved_mesh.hpp"
 #include "surface3d/mesh/triangle_mesh.hpp"
@@ -138,7 +139,8 @@ inline TriangleMesh bent_body(double gap) {
     TriangleMesh mesh = geodesic_sphere(10);
     const Vector3d face_centre = Vector3d(-1, (1 + std::sqrt(5.0)) / 2, 0) + Vector3d(-(1 + std::sqrt(5.0)) / 2, 0, 1) +
                                  Vector3d(0, 1, (1 + std::sqrt(5.0)) / 2);
-    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(face_centre, Vector3d::UnitZ());
+    const Vector3d across = face_centre.cross(Vector3d::UnitZ());
+    const Eigen::AngleAxisd turn(std::atan2(across.norm(), face_centre[2]), across.normalized());
     const double radius = 1.6, stretch = std::numbers::pi * radius - gap / 2 - 1;
     for (Vector3d& x : mesh.points) {
         x = turn * x;
@@ -180,7 +182,7 @@ inline Errors errors(const CurvedMesh& mesh, const Surface& surface) {
     };
     Eigen::MatrixXd at_nodes(n, n);
     for (int a = 0; a < n; ++a) at_nodes.row(a) = monomial_row(double(index[a][1]) / k, double(index[a][2]) / k, 0, 0);
-    const Eigen::MatrixXd inverse = at_nodes.inverse();
+    const Eigen::MatrixXd inverse = solve_dense(at_nodes, Eigen::MatrixXd::Identity(n, n));
 
     Errors sum;
     int count = 0;

@@ -146,7 +146,7 @@ Eigen::Matrix<Complex, 5, 5> equations(const UniformTube& tube, const MotionLaw&
 }
 
 TEST(Dispersion, ratesSolveTheLinearisedEquations) {
-    // The matrix is singular at each rate, by the smallest singular value against the largest, and not beside it.
+    // The matrix is singular at each rate, by its condition number, and not beside it.
     const UniformTube tube = some_tube();
     for (const ModelKind kind : {ModelKind::overdamped, ModelKind::stokes, ModelKind::fluid})
         for (const auto& [Re, gamma] : {std::pair{2.0, 0.3}, {20.0, 0.1}, {0.5, 0.0}})
@@ -158,10 +158,9 @@ TEST(Dispersion, ratesSolveTheLinearisedEquations) {
                     const Growth found = growth(tube, law, q, m);
                     EXPECT_EQ(found.roots.size(), kind != ModelKind::fluid ? 1u : m == 0 || q == 0 ? 2u : 3u);
                     const auto singular = [&](Complex s) {
-                        const auto values =
-                            Eigen::JacobiSVD<Eigen::Matrix<Complex, 5, 5>>(equations(tube, law, q, m, s))
-                                .singularValues();
-                        return values[4] / values[0];
+                        const Eigen::MatrixXcd A = equations(tube, law, q, m, s);
+                        const double inverse = A.partialPivLu().inverse().norm();  // not finite if a pivot is 0
+                        return std::isfinite(inverse) ? 1 / (A.norm() * inverse) : 0;
                     };
                     for (const Complex& s : found.roots) {
                         EXPECT_LT(singular(s), 1e-3 * singular(s * 1.0001 + 1e-4)) << "m " << m << " q " << q;
@@ -542,7 +541,7 @@ TEST(Waves, ofAFluidFollowTheCubic) {
         Eigen::VectorXcd start = Eigen::VectorXcd::Zero(roots);
         start[0] = 1;
         if (roots == 3) start[2] = -mobility(held, law, q, m) * stiffness(held, m)(q);
-        const Eigen::VectorXcd parts = A.fullPivLu().solve(start);
+        const Eigen::VectorXcd parts = A.partialPivLu().solve(start);
         Complex expected = 0;
         for (Eigen::Index i = 0; i < roots; ++i) expected += parts[i] * std::exp(exact.roots[i] * t);
         const auto state = waves_in_time(tube, law, length, {{n, m, 1e-3}}, {t})[0];
