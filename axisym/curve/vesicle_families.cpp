@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "axisym/splines/arc_length.hpp"
 #include "common/shapes/ellipsoid.hpp"
 
 namespace tubule::axisym {
@@ -78,6 +80,32 @@ Curve bowl(double thickness, double opening) {
                           -middle * std::cos(opening) - rim * std::cos(angle), total * std::sin(angle)};
     };
     return m;
+}
+
+std::optional<Family> family_of(const Curve& cell, double reduced_volume) {
+    if (reduced_volume > 1 - volume_off_sphere) return std::nullopt;
+    // Distances relative to the largest radius, below which a profile is symmetric and a pole is not dented.
+    constexpr double symmetric = 0.02, dented = 1e-3;
+    constexpr int intervals = 200;
+    const ArcLength arc(cell);
+    Eigen::Matrix2Xd x(2, intervals + 1);
+    for (int i = 0; i <= intervals; ++i) {
+        const auto [r, z] = arc.point(static_cast<double>(i) / intervals);
+        x.col(i) << r, z;
+    }
+    const double width = x.row(0).maxCoeff(), low = x.row(1).minCoeff(), high = x.row(1).maxCoeff();
+    const double south = x(1, 0), north = x(1, intervals);
+    Eigen::Matrix2Xd image = x.rowwise().reverse();
+    image.row(1) = (south + north - image.row(1).array()).matrix();
+    if ((x - image).cwiseAbs().maxCoeff() < symmetric * width)
+        return high - low > 2 * width ? Family::prolate : Family::oblate;
+    const double dent = std::max(std::min(south, north) - low, high - std::max(south, north));
+    return dent > dented * width ? Family::stomatocyte : Family::pear;
+}
+
+std::string_view name(Family family) {
+    static constexpr std::array<std::string_view, 4> names{"prolate", "oblate", "stomatocyte", "pear"};
+    return names[static_cast<std::size_t>(family)];
 }
 
 }  // namespace tubule::axisym

@@ -1,6 +1,10 @@
-// First guesses for the families of vesicles.
+// Families of vesicles: first guesses, and to which one a cell belongs.
 #pragma once
 
+#include <optional>
+#include <string_view>
+
+#include "common/case/equilibrium_choices.hpp"
 #include "common/shapes/curve.hpp"
 
 namespace tubule::axisym {
@@ -11,5 +15,13 @@ namespace tubule::axisym {
 Curve spheroid(double reduced_volume, bool prolate);
 Curve pear(double reduced_volume);
 Curve bowl(double thickness, double opening);
+
+// Reduced volumes within this of 1 are those of spheres, which belong to no family.
+inline constexpr double volume_off_sphere = 1e-3;
+
+// Of a profile that is its own mirror image: prolate if longer than wide, else oblate; of another one: stomatocyte if a
+// pole lies inside its height, else pear. Nothing for a sphere.
+std::optional<Family> family_of(const Curve& cell, double reduced_volume);
+std::string_view name(Family family);
 
 }  // namespace tubule::axisym

@@ -133,6 +133,11 @@ int first_mode(const Problem& c) {
     return c.model.free_period ? 1 : 0;
 }
 
+bool has_force(const Problem& c) {
+    return std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape) || c.law.beads ||
+           has_two_rings(c.shape);
+}
+
 SeriesTable<Row> shape_series(const Problem& c) {
     SeriesTable<Row> table;
     add_first_columns(table, c.equilibrium->branch);
@@ -146,9 +151,7 @@ SeriesTable<Row> shape_series(const Problem& c) {
     if (!c.energy.potentials.empty())
         table.add({{"potential_energy", [](const Row& r) { return r.o.potential.energy; }}});
     add_extents(table);
-    if (std::holds_alternative<Tube>(c.shape) || std::holds_alternative<ResultFrame>(c.shape) || c.law.beads ||
-        has_two_rings(c.shape))
-        table.add({{"force", [](const Row& r) { return axial_force(r.problem, r.point.shape); }}});
+    if (has_force(c)) table.add({{"force", [](const Row& r) { return axial_force(r.problem, r.point.shape); }}});
     if (c.law.beads) table.add({{"bead_distance", [](const Row& r) { return r.point.shape.length; }}});
     if (!c.energy.potentials.empty())
         table.add({{"potential_force", [](const Row& r) { return r.o.potential.force; }}});
@@ -242,7 +245,15 @@ public:
     }
 
     void describe(const FoundShapes<Equilibrium>& found, RunSummary& s) const {
-        const double energy = found.last.observed.energy;
+        const CurveObservation& o = found.last.observed;
+        const double energy = o.energy;
+        const auto wanted = c_.equilibrium->family;
+        const auto family = wanted && !task_.set && s.stop.reason == Stop::finished
+                                ? family_of(meridian(*found.last.space, found.last.x), reduced_volume(o.area, o.volume))
+                                : std::nullopt;
+        if (family && family != wanted)
+            s.warnings.push_back(fmt::format("the search began at the family {} and found a shape of the family {}",
+                                             name(*wanted), name(*family)));
         if (const auto limit = limit_of(task_);
             limit && !task_.set && s.stop.reason == Stop::finished && limit->energy < energy)
             s.warnings.push_back(
@@ -299,7 +310,8 @@ void check_equilibrium(const Problem& c) {
 CaseShape find_shape(const Problem& c, RunObserver& observer) {
     const RunClock clock(c.time, observer);
     const Task task = task_of(c);
-    CaseShape out{find_equilibrium(task.problem, task.start, task.settings), {}, limit_of(task), false};
+    CaseShape out{find_equilibrium(task.problem, task.start, task.settings), {}, limit_of(task), {}, false};
+    if (has_force(c)) out.force = axial_force(task.problem, out.shape);
     out.meets_constraints = meets(task.problem.constraints, out.shape.observed);
     if (out.shape.stop == Stop::finished && c.equilibrium->modes)
         out.modes = mode_stability(task.problem, out.shape, *c.equilibrium->modes, c.law);

@@ -27,6 +27,7 @@ struct CaseShape {
     Equilibrium shape;
     std::vector<ModeRates> modes;             // of a shape that was found, if asked for
     std::optional<theory::LimitShape> limit;  // of a cell whose area and volume are held
+    std::optional<double> force;              // as the series of that name, where there is one
     bool meets_constraints;                   // area and volume to a percent, of a last state, too
 };
 CaseShape find_shape(const Problem& c, RunObserver& observer);

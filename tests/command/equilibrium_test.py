@@ -34,7 +34,11 @@ class Equilibrium(ProgramTest):
         self.assertIn("a sphere leads to no other area and volume", out)
         self.assertIn("or by equilibrium.family", out)
         self.assertEqual(about(self.folder / "cell.hdf")["estimated_error"], 1)  # nothing is known
-        self.tubule("run", case, "--set", 'equilibrium.family="prolate"', "--overwrite")
+        out, _ = self.tubule("run", case, "--set", 'equilibrium.family="prolate"', "--overwrite")
+        self.assertNotIn("family", out)
+        # No stomatocyte has this reduced volume: Seifert, Berndl, Lipowsky, Phys. Rev. A 44, 1182 (1991).
+        out, _ = self.tubule("run", case, "--set", 'equilibrium.family="stomatocyte"', "--overwrite")
+        self.assertIn("began at the family stomatocyte and found a shape of the family oblate", out)
 
     def test_one_shape(self):
         case = self.write("cell.toml", CASE)

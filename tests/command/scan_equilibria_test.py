@@ -101,6 +101,18 @@ class Found(EquilibriaTest):
         self.assertEqual({entry["value"] for entry in document["equal_energies"]}, set(found.values()))
         self.assertEqual({entry["key"] for entry in document["equal_energies"]}, {VOLUME})
 
+    def test_forces_of_tubes(self):
+        """A tube at the tension s has the radius sqrt(k20/s) and the force 4 pi sqrt(k20 s): theory.md (3.16)."""
+        self.write("tube.toml", 'tier = "axisym"\n[energy]\nk20 = 0.5\n[shape]\nkind = "tube"\nradius = 1.0\nlength = 2.0\n'
+                   '[equilibrium]\nheld = "nothing"\n[model]\ntension = 0.5\n')  # fmt: skip
+        self.scan("tube.toml", "--over=model.tension=0.5,2", "-o", "scan.hdf")
+        rows = list(csv.DictReader(io.StringIO(self.tubule("show", "scan.hdf", "--csv")[0])))
+        for row in rows:
+            s = float(row["model.tension"])
+            self.assertAlmostEqual(float(row["force"]), 4 * math.pi * math.sqrt(0.5 * s), delta=1e-3)
+            self.assertAlmostEqual(float(row["r_max"]), math.sqrt(0.5 / s), delta=1e-3)
+        self.assertEqual(len(rows), 2)
+
     @study
     def test_pears_and_vesiculated_limits(self):
         """Energies of limits: scipy.optimize.brentq for R^2 + r^2 = 1, R^3 + r^3 = v."""

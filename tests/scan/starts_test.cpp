@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "axisym/curve/vesicle_families.hpp"
 #include "common/case/read.hpp"
 #include "tests/support/message_of.hpp"
 #include "tools/scan/dispatcher.hpp"
@@ -31,16 +32,16 @@ Scan scan_over(const std::vector<std::string>& over, const std::string& case_tex
 const std::string families = "equilibrium.family=\"prolate\",\"oblate\"",
                   volumes = "equilibrium.reduced_volume=0.6:0.9:4", curvatures = "energy.H0=-1,0,1";
 
-// r = 1 + a cos 2t + b cos t + c cos 3t in the direction t from the south pole; area and volume are not those of it.
+// r = 1 + a cos 2t + b cos t + c cos 3t in the direction t from the south pole; the reduced volume is not that of it.
 Outcome kind(double a, double b, double c, double reduced_volume = 0.7) {
-    constexpr double pi = std::numbers::pi;
-    std::vector<double> r, z;
-    for (int i = 0; i <= 300; ++i) {
-        const double t = pi * i / 300, d = 1 + a * std::cos(2 * t) + b * std::cos(t) + c * std::cos(3 * t);
-        r.push_back(d * std::sin(t));
-        z.push_back(-d * std::cos(t));
-    }
-    return cell_at_rest(r, z, 4 * pi, reduced_volume * 4 * pi / 3);
+    Curve cell;
+    cell.at = [=](double s) {
+        const double t = pi * s, d = 1 + a * std::cos(2 * t) + b * std::cos(t) + c * std::cos(3 * t),
+                     slope = -2 * a * std::sin(2 * t) - b * std::sin(t) - 3 * c * std::sin(3 * t);
+        return std::array{d * std::sin(t), pi * (slope * std::sin(t) + d * std::cos(t)), -d * std::cos(t),
+                          pi * (d * std::sin(t) - slope * std::cos(t))};
+    };
+    return cell_at_rest(axisym::family_of(cell, reduced_volume));
 }
 
 TEST(Starts, KindsOfCells) {

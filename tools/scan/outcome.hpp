@@ -2,11 +2,11 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/case/equilibrium_choices.hpp"
 #include "common/solve/stop.hpp"
 
 namespace tubule {
@@ -42,16 +42,12 @@ struct EndShape {
     double r_min = 0, r_max = 0, area = 0, volume = 0;
 };
 
-// A tube counts as uniform if its radii differ by less than this part of their sum; a cell as a sphere if its reduced
-// volume is within this of 1.
-inline constexpr double waves_of_uniform_tube = 0.01, volume_off_sphere = 1e-3;
-// Distances of a cell in equilibrium, relative to its largest radius: a profile that differs less from its mirror image is symmetric,
-// and a pole that lies less below the rim is not dented.
-inline constexpr double asymmetry_of_mirrored = 0.02, smallest_dent = 1e-3;
+// A tube counts as uniform if its radii differ by less than this part of their sum.
+inline constexpr double waves_of_uniform_tube = 0.01;
 
 Outcome outcome_of(Stop reason, const EndShape& end);
 
-// Shape of a cell in equilibrium, by points (r, z) along its profile from pole to pole.
-Outcome cell_at_rest(std::span<const double> r, std::span<const double> z, double area, double volume);
+// That of a cell in equilibrium: axisym::family_of.
+Outcome cell_at_rest(std::optional<Family> family);
 
 }  // namespace tubule

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "axisym/curve/curve_measures.hpp"
+#include "axisym/curve/vesicle_families.hpp"
 #include "axisym/equilibrium/equilibrium_run.hpp"
 #include "axisym/graph/graph_mesh.hpp"
 #include "axisym/graph/graph_output.hpp"
@@ -165,16 +166,18 @@ struct Interruptible : RunObserver {
     bool interrupted() override { return tubule::interrupted(); }
 };
 
-Outcome outcome_of_shape(const axisym::Equilibrium& shape, const ProfilePoints& profile, const EndShape& end) {
+Outcome outcome_of_shape(const axisym::Equilibrium& shape, const EndShape& end) {
     if (shape.stop != Stop::finished) return outcome_of(shape.stop, end);
-    if (shape.space->topology() == Topology::cell) return cell_at_rest(profile.r, profile.z, end.area, end.volume);
+    if (shape.space->topology() == Topology::cell)
+        return cell_at_rest(
+            axisym::family_of(axisym::meridian(*shape.space, shape.x), reduced_volume(end.area, end.volume)));
     return outcome_of(Stop::stationary, end);
 }
 
 // The shape that a case with [equilibrium] finds. Throws as the search.
 PointResult equilibrium_point(const Problem& c) {
     Interruptible observer;
-    const auto [shape, modes, limit, meets_constraints] = axisym::find_shape(c, observer);
+    const auto [shape, modes, limit, force, meets_constraints] = axisym::find_shape(c, observer);
     PointResult p = unknown_point(0);
     p.stop = stop_word(shape.stop);
     p.message = shape.stop == Stop::finished ? "the shape is stationary" : shape.message;
@@ -195,6 +198,7 @@ PointResult equilibrium_point(const Problem& c) {
         p[Measure::height] = measured.height;
         p[Measure::tension] = shape.sigma;
         p[Measure::pressure] = -shape.lambda;
+        if (force) p[Measure::force] = *force;
     }
     if (meets_constraints)
         p[Measure::free_energy] =
@@ -202,7 +206,7 @@ PointResult equilibrium_point(const Problem& c) {
     for (const axisym::ModeRates& mode : modes)
         if (!mode.rates.empty()) p[Measure::growth] = std::fmax(p[Measure::growth], mode.rates.front());
     const EndShape end{tube, p[Measure::r_min], p[Measure::r_max], p[Measure::area], p[Measure::volume]};
-    p.outcome = outcome_of_shape(shape, profile, end);
+    p.outcome = outcome_of_shape(shape, end);
     return p;
 }
 

@@ -28,6 +28,7 @@ enum class Measure {
     height,
     tension,
     pressure,
+    force,
     growth,
     free_energy,
     limit_energy,
@@ -36,10 +37,10 @@ enum class Measure {
     wall_seconds,
     cpu_seconds
 };
-inline constexpr std::array measure_names{"energy",   "time",         "energy_error", "E_ref",        "r_min",
-                                          "r_max",    "area",         "volume",       "height",       "tension",
-                                          "pressure", "growth",       "free_energy",  "limit_energy", "steps",
-                                          "elements", "wall_seconds", "cpu_seconds"};
+inline constexpr std::array measure_names{"energy",   "time",     "energy_error", "E_ref",       "r_min",
+                                          "r_max",    "area",     "volume",       "height",      "tension",
+                                          "pressure", "force",    "growth",       "free_energy", "limit_energy",
+                                          "steps",    "elements", "wall_seconds", "cpu_seconds"};
 inline constexpr std::size_t n_measures = measure_names.size();
 
 struct PointResult {

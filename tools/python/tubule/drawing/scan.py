@@ -57,6 +57,7 @@ QUANTITIES = {
     "height": ("height", "length"),
     "tension": ("tension", "energy/length^2"),
     "pressure": ("pressure", "energy/length^3"),
+    "force": ("axial force", "energy/length"),
     "growth": ("largest growth rate", "1/time"),
     "free_energy": ("free energy F", "energy"),
     "limit_energy": ("energy of the vesiculated limit", "energy"),
