@@ -96,10 +96,11 @@ std::optional<Clock> clock_of(const Case& c, const Scales& s) {
 constexpr std::array<const char*, 10> prefixes{"a", "f", "p", "n", "u", "m", "", "k", "M", "G"};
 constexpr int first_power = -18, powers_apart = 3;
 
-// With the prefix that makes one unit of the case a number from 1 to 1000, where there is one.
-LabUnit prefixed(double si, const std::string& base, int largest_power = 9) {
+// With the prefix that makes this number of it, such as one, a number from 1 to 1000, where there is one.
+LabUnit prefixed(double si, const std::string& base, int largest_power = 9, double number = 1) {
     constexpr double rounding = 1e-9;
-    const int power = std::clamp(static_cast<int>(std::floor(std::log10(si) / powers_apart + rounding)) * powers_apart,
+    const double digits = std::log10(si * number);
+    const int power = std::clamp(static_cast<int>(std::floor(digits / powers_apart + rounding)) * powers_apart,
                                  first_power, largest_power);
     return {si * std::pow(10.0, -power), prefixes[(power - first_power) / powers_apart] + base};
 }
@@ -183,7 +184,7 @@ std::optional<Scales> known_scales(const Case& c) {
     return c.units ? std::optional(scales_of(c)) : std::nullopt;
 }
 
-LabUnit lab_unit(const std::optional<Scales>& scales, std::string_view unit) {
+LabUnit lab_unit(const std::optional<Scales>& scales, std::string_view unit, double number) {
     const auto powers = powers_of(unit);
     if (!scales || !powers || *powers == Powers{} || ((*powers)[2] != 0 && !scales->time)) return {};
     const auto& [energy, length, time] = *powers;
@@ -193,8 +194,10 @@ LabUnit lab_unit(const std::optional<Scales>& scales, std::string_view unit) {
     for (const auto& [of, name] : named)
         if (of == *powers) {
             const double si = std::pow(scales->energy, energy) * std::pow(scales->length, length) * std::pow(T, time);
-            const bool of_tweezers = of == named[0].first && si > 1e-15 && si < 1e-9;
-            return of_tweezers ? LabUnit{si * 1e12, "pN"} : prefixed(si, name);
+            // What is far below one unit is mostly rounding of zero.
+            const double size = std::isfinite(number) && std::abs(number) > 1e-6 ? std::abs(number) : 1;
+            const bool of_tweezers = of == named[0].first && si * size > 1e-15 && si * size < 1e-9;
+            return of_tweezers ? LabUnit{si * 1e12, "pN"} : prefixed(si, name, 9, size);
         }
     return product({{{scales->energy / scales->kT, "kT"}, prefixed(scales->length, "m", 0), prefixed(T, "s", 0)}},
                    *powers);

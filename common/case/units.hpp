@@ -45,7 +45,8 @@ struct LabUnit {
 };
 
 // For a unit as the catalogue of series has it, such as energy/length^2. A name that is empty: the number stays as it
-// is, since it has no dimension, or its unit is not known.
-LabUnit lab_unit(const std::optional<Scales>& scales, std::string_view unit);
+// is, since it has no dimension, or its unit is not known. Tensions, forces, pressures and velocities have the prefix
+// that suits this number of the case.
+LabUnit lab_unit(const std::optional<Scales>& scales, std::string_view unit, double number = 1);
 
 }  // namespace tubule

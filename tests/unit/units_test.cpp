@@ -102,6 +102,12 @@ TEST(Units, EveryDimensionHasAUnit) {
     for (const char* none : {"1", "radian", "s", "that of the key"}) EXPECT_EQ(lab_unit(s, none).name, "") << none;
     EXPECT_EQ(lab_unit(std::nullopt, "energy").name, "");
     EXPECT_EQ(lab_unit(scales_of(with({})), "length/time").name, "");  // the unit of time is not known
+    // Prefixes by numbers
+    for (const auto& [number, name] :
+         std::map<double, std::string>{{-1e3, "mN/m"}, {0, "uN/m"}, {1e-15, "uN/m"}, {1e-3, "nN/m"}})
+        EXPECT_EQ(lab_unit(s, "energy/length^2", number).name, name) << number;
+    EXPECT_EQ(lab_unit(s, "energy/length", 1e3).name, "nN");
+    EXPECT_EQ(lab_unit(s, "energy", 1e3).name, "kT");
     // Prefixes at their ends
     const auto length = [](const std::string& text) {
         const LabUnit unit = lab_unit(scales_of(with({"units.length=" + text})), "length");

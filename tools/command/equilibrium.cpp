@@ -23,7 +23,13 @@ namespace {
 Text table_of(const Result& result, const std::optional<Scales>& scales) {
     Text out;
     const auto has = [&](const char* name) { return result.series.contains(name); };
-    const auto unit = [&](const std::string& name) { return lab_unit(scales, find_series(name)->unit); };
+    const auto unit = [&](const std::string& name) {
+        const auto found = result.series.find(name);
+        double largest = 0;
+        if (found != result.series.end())
+            for (const double number : found->second) largest = std::fmax(largest, std::abs(number));
+        return lab_unit(scales, find_series(name)->unit, largest);
+    };
     const auto value = [&](const std::string& name, std::size_t row) {
         return result.series.at(name)[row] * unit(name).scale;
     };

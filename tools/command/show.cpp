@@ -75,13 +75,13 @@ struct Shown {
     bool numbered = false;
 };
 
-// The unit in which a series, a number of a frame or one about the run is shown.
-LabUnit unit_of(const Shown& in, const std::string& name) {
+// The unit in which a series, a number of a frame or one about the run is shown, its prefix by this number.
+LabUnit unit_of(const Shown& in, const std::string& name, double number = 1) {
     if (name == "length") return lab_unit(in.scales, "length");  // the period of a frame
     if (name == "E_ref") return lab_unit(in.scales, "energy");
     if (name == "time" || name == "stop_time") return in.numbered ? LabUnit{} : lab_unit(in.scales, "time");
     const SeriesEntry* entry = find_series(name);
-    return entry ? lab_unit(in.scales, entry->unit) : LabUnit{};
+    return entry ? lab_unit(in.scales, entry->unit, number) : LabUnit{};
 }
 
 // The units below the names of add_frames.
@@ -141,8 +141,10 @@ void add_summary(Text& out, const Result& result, const std::string& file, const
     if (result.checkpoint) line("checkpoint", "time " + with_unit(result.checkpoint->time, unit_of(in, "time"), 8));
     if (!times.empty()) {
         add(out, "\nlast row\n");
-        for (const std::string& name : result.series_names)
-            line("  " + name, with_unit(result.series.at(name).back(), unit_of(in, name), 12));
+        for (const std::string& name : result.series_names) {
+            const double number = result.series.at(name).back();
+            line("  " + name, with_unit(number, unit_of(in, name, number), 12));
+        }
     }
     add_meshes(out, result.meshes, lab_unit(in.scales, "length"));
     add_frames(out, result.frames, in);

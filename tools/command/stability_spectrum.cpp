@@ -90,8 +90,8 @@ std::string words_of(const std::vector<Found>& found, double kT, const std::opti
         out += fmt::format("{}{}\n", out.empty() ? "" : "\n", words_of_model(problem));
         if (spectrum.at_rest())
             add(out, "  stationary, with tension {}, pressure {}\n",
-                with_unit(spectrum.sigma, lab_unit(scales, "energy/length^2"), 8),
-                with_unit(-spectrum.lambda, lab_unit(scales, "energy/length^3"), 8));
+                with_unit(spectrum.sigma, lab_unit(scales, "energy/length^2", spectrum.sigma), 8),
+                with_unit(-spectrum.lambda, lab_unit(scales, "energy/length^3", spectrum.lambda), 8));
         else
             out += "  in motion: growth rates hold at this instant only\n";
         out += fmt::format("    m {:>14} ...{}{}\n", "rates", unit.name.empty() ? "" : " in", unit.after());

@@ -79,8 +79,8 @@ std::string words_of(const SurfaceModes& found, const std::optional<Scales>& sca
     std::string out = found.model + "\n";
     add(out, "  stationary, with energy {:.8g} +- {:.1e}{}, tension {}, pressure {}\n", value("energy") * energy.scale,
         value("energy_error") * energy.scale, energy.after(),
-        with_unit(value("tension"), lab_unit(scales, "energy/length^2"), 8),
-        with_unit(value("pressure"), lab_unit(scales, "energy/length^3"), 8));
+        with_unit(value("tension"), lab_unit(scales, "energy/length^2", value("tension")), 8),
+        with_unit(value("pressure"), lab_unit(scales, "energy/length^3", value("pressure")), 8));
     add(out, "  {:.0f} directions lower the energy under what is held\n", value("negative_directions"));
     out += words_of_modes(found.modes, scales);
     add(out, "  {:.0f} triangles\n", value("elements"));

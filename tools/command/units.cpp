@@ -85,7 +85,7 @@ void add_properties(Text& out, const Case& c, const Scales& s) {
     const double R = s.length, eta = s.energy * s.time.value_or(0) / (R * R);
     const ModelEntry& has = model_entry(c.model.kind);
     const double gamma = c.model.gamma.value_or(has.inextensible ? 0 : 1);
-    add(out, "numbers of the case\n");
+    if (!c.energy.H0_varies() || s.time) add(out, "numbers of the case\n");
     if (!c.energy.H0_varies())
         add(out, "  {:<12} {:<20} c0 = -H0/length\n", "curvature", with_unit(-c.energy.H0, lab_unit(s, "1/length"), 4));
     if (!s.time) return;
