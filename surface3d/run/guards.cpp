@@ -107,14 +107,15 @@ std::optional<StopReport> find_rise_in_step(double rise, double asked, double ti
     return StopReport{
         Stop::resolution_lost, time,
         fmt::format("the energy increased by {:.3g} of E_ref in a step of {:.3g}, which the model forbids", rise, step),
-        "use a smaller discretisation.step where one is given, else use more elements"};
+        "use more elements, a looser accuracy.energy, or a smaller discretisation.step where one is given"};
 }
 
 std::optional<StopReport> find_slow_rise(double rise, double asked, double time) {
     if (rise <= creep * asked) return std::nullopt;
-    return StopReport{Stop::resolution_lost, time,
-                      fmt::format("the energy gradually increased by {:.3g} of E_ref, which the model forbids", rise),
-                      "use a smaller discretisation.step where one is given, else use more elements"};
+    return StopReport{
+        Stop::resolution_lost, time,
+        fmt::format("the energy gradually increased by {:.3g} of E_ref, which the model forbids", rise),
+        "use more elements, a looser accuracy.energy, or a smaller discretisation.step where one is given"};
 }
 
 std::optional<StopReport> find_impossible_motion(const Observables& o, const CurvedMesh& mesh, double allowed,
