@@ -106,8 +106,8 @@ class Counts(unittest.TestCase):
 
 class GroundStates(unittest.TestCase):
     def test_no_random_shape_leads_below_the_families(self):
-        """A smooth shape of less energy than all families: none, but where a vesiculated limit is lower still."""
-        draw, lower, none = random.Random(1), [], 0
+        """A smooth shape of less energy than all families: none, unless the search of a family failed and said so."""
+        draw, lower, behind_failed, none = random.Random(1), [], [], 0
         with tempfile.TemporaryDirectory() as name:
             for _ in range(POINTS):
                 v, H0 = draw.uniform(0.5, 0.99), draw.uniform(-3.5, 3)
@@ -121,8 +121,10 @@ class GroundStates(unittest.TestCase):
                 for _ in range(SHAPES):
                     shape = Shape(Path(name), case + sphere + random_modes(draw, 3, False))
                     if shape.found and shape.energy < least - 2 * shape.uncertainty - 1e-4:
-                        lower.append((round(v, 4), round(H0, 3), least, shape.energy))
-        print(f"\n{POINTS} points, {SHAPES} shapes each: {none} where no family leads to a smooth shape; lower: {lower}")
+                        failed = any(s.stop == "solver-failed" for s in families)
+                        (behind_failed if failed else lower).append((round(v, 4), round(H0, 3), least, shape.energy))
+        print(f"\n{POINTS} points, {SHAPES} shapes each: {none} where no family leads to a smooth shape; lower: {lower}; "
+              f"where a family failed: {behind_failed}")
         self.assertEqual(lower, [])
 
 
