@@ -198,6 +198,7 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.drift = add(law.inextensible && !held, 1);
     at_.mu = add(bending.alpha.has_value(), 1);
     at_.bead = add(law.beads.has_value(), 4);
+    at_.reach = add(law.inertia != 0 && law.beads && law.beads->extension, 1);
     const int ends = space.topology() == Topology::strip ? 2 : 1, conditions = ends * (law.rim == Rim::clamped ? 3 : 2);
     at_.rim = add(space.is_patch(), conditions);
     if (law.open_rim)
@@ -207,7 +208,7 @@ CurveMotion::CurveMotion(const CurveSpace& space, const Bending& bending, const 
     at_.shift = add(space.topology() == Topology::tube && !law.lagrangian, 1);
     at_.size = size;
     for (const int number : {at_.rise, at_.tension, at_.supply, at_.stretch, at_.lambda, at_.area, at_.volume,
-                             at_.drift, at_.mu, at_.shift})
+                             at_.drift, at_.mu, at_.reach, at_.shift})
         if (number >= 0) numbers_.push_back(number);
     for (int i = 0; i < 4 && at_.bead >= 0; ++i) numbers_.push_back(at_.bead + i);
     for (int i = 0; i < conditions && at_.rim >= 0; ++i) {
@@ -358,6 +359,7 @@ bool CurveMotion::residual(double t, const double* y, const double* rate, double
         beads_->add_force(y, bead_numbers(y), law_.inextensible ? F + at_.u_r : F);
         Eigen::Map<BeadNumbers>(F + at_.bead) =
             beads_->equations().residual(beads_->on(y), bead_load(t), bead_numbers(y));
+        if (at_.reach >= 0) hold_reach(t, y, F);
     }
     if (at_.rim >= 0) hold_rim(t, y, F);
     if (at_.stretch < 0) return true;
@@ -609,10 +611,64 @@ void CurveMotion::add_beads(double t, const double* y, double* values) const {
     const BeadEquations::Slopes s = beads_->equations().slopes(beads_->on(y), bead_load(t), bead_numbers(y));
     for (int k = 0; k < 4; ++k) {
         double* column = values + pattern_.outerIndexPtr()[at_.bead + k];
-        const std::vector<int>& row = number_rows_.at(at_.bead + k);
+        const bool of_reach = at_.reach >= 0 && k == beads_->equations().distance_row();
+        const std::vector<int>& row = number_rows_.at(of_reach ? at_.reach : at_.bead + k);
         for (int i = 0; i < n; ++i) column[rows + i] += s.force_by_numbers(i, k);
         for (int i = 0; i < n; ++i) values[row[i]] += s.equations_by_shape(k, i);
         for (int j = 0; j < 4; ++j) values[row[at_.bead + j]] += s.equations_by_numbers(k, j);
+    }
+    if (at_.reach >= 0) add_reach(y, values);
+}
+
+// With the multipliers by which SUM q G has the derivative of the distance.
+BeadNumbers CurveMotion::lengthening_beads(const double* y) const {
+    BeadNumbers out = bead_numbers(y);
+    const BeadSurface on = beads_->on(y);
+    for (int k = 0; k < 2; ++k)
+        if (beads_->equations().has_bead(k))
+            out[2 * k + 1] = -1 / beads_->equations().slopes_in_P(on, k, out[2 * k])[0];
+    return out;
+}
+
+// The rate of the distance as the curve moves with the velocity.
+double CurveMotion::reach_rate(const double* y) const {
+    Eigen::VectorXd slope = Eigen::VectorXd::Zero(space().size());
+    beads_->add_force(y, lengthening_beads(y), slope.data());
+    return slope.dot(velocity(y));
+}
+
+// At a kink the rate is that before it: steps end there.
+void CurveMotion::hold_reach(double t, const double* y, double* F) const {
+    const int row = at_.bead + beads_->equations().distance_row();
+    F[at_.reach] = F[row];
+    F[row] = reach_rate(y) - law_.beads->rate(std::nextafter(t, -HUGE_VAL));
+    BeadNumbers drift = lengthening_beads(y);
+    drift[1] *= y[at_.reach], drift[3] *= y[at_.reach];
+    beads_->add_force(y, drift, F);
+}
+
+// Its multiplier is zero but for errors in time: second derivatives of the distance are left out of its column.
+void CurveMotion::add_reach(const double* y, double* values) const {
+    const int n = space().size();
+    const BeadNumbers at = lengthening_beads(y);
+    const Eigen::VectorXd u = velocity(y);
+    const BeadEquations::Slopes s = beads_->equations().slopes(beads_->on(y), {}, at);
+    Eigen::SparseMatrix<double> second = forms_.pattern();
+    std::fill_n(second.valuePtr(), second.nonZeros(), 0.0);
+    beads_->add_hessian(y, at, forms_.slots(), second.valuePtr());
+    Eigen::VectorXd slope = Eigen::VectorXd::Zero(n), by_curve = second * u;
+    const std::vector<int>& row = number_rows_.at(at_.bead + beads_->equations().distance_row());
+    for (int k = 0; k < 2; ++k) {
+        if (!beads_->equations().has_bead(k)) continue;
+        const int P = 2 * k, q = P + 1;
+        const double along = at[q] * s.force_by_numbers.col(q).dot(u);
+        slope += at[q] * s.force_by_numbers.col(q), by_curve += along * s.force_by_numbers.col(P);
+        values[row[at_.bead + P]] += s.force_by_numbers.col(P).dot(u) + along * s.equations_by_numbers(q, P);
+    }
+    double* column = values + pattern_.outerIndexPtr()[at_.reach];
+    for (int i = 0; i < n; ++i) {
+        values[row[i]] += by_curve[i], values[row[at_.u_r + i]] += slope[i];
+        column[i] += slope[i];
     }
 }
 
@@ -759,18 +815,18 @@ struct Equilibrated {
 
 }  // namespace
 
-InitialState CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const {
+InitialState CurveMotion::consistent(const Eigen::VectorXd& y0, double h, double time) const {
     constexpr int most_iterations = 25;
     constexpr double most_growth = 10;  // of a correction, before smaller ones follow
     constexpr double rounding = 1e-9;   // of the curve: corrections below it need not become smaller
-    InitialState s{y0, Eigen::VectorXd::Zero(at_.size), 2 * h, h};
+    InitialState s{y0, Eigen::VectorXd::Zero(at_.size), time + 2 * h, h};
     Eigen::VectorXd before = y0, F(at_.size);
     Eigen::SparseMatrix<double> J = pattern_;
     SparseLu lu;
     for (int step = 0; step < 2; ++step, before = s.y) {
         s.rate.setZero();
         double last = std::numeric_limits<double>::infinity();
-        const double t = (step + 1) * h;
+        const double t = time + (step + 1) * h;
         for (int iteration = 0;; ++iteration) {
             if (!residual(t, s.y.data(), s.rate.data(), F.data()))
                 throw SolveError("the profile leaves the half plane r > 0 at the start of the motion");
@@ -787,6 +843,9 @@ InitialState CurveMotion::consistent(const Eigen::VectorXd& y0, double h) const 
                 throw SolveError("Newton's method for the initial velocities does not converge");
             last = size;
         }
+        if (at_.reach >= 0)  // where the rate jumps, a constraint does work at the mean of both
+            s.work += h * beads_->force(s.y.data(), bead_numbers(s.y.data())) *
+                      (reach_rate(before.data()) + reach_rate(s.y.data())) / 2;
     }
     s.rate.array() *= differential().array();  // the others jumped from a guess
     return s;

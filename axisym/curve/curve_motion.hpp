@@ -44,6 +44,7 @@ struct MotionLayout {
     int drift = -1;               // of INT u_z = 0, where nothing else holds the curve in its place
     int mu = -1;                  // alpha (M - M0): the force mu 2 K nu, theory.md (2.20)
     int bead = -1;                // first of BeadNumbers
+    int reach = -1;               // of their distance, against drift, where the force holds its rate (with inertia)
     int rim = -1, rim_flow = -1;  // of a patch, first multipliers of rim_functionals(): of the curve, of the velocity
     int shift = -1;               // of INT (X_t - u).t = 0, as the parameter of a period has no fixed point
     int size = 0;
@@ -53,6 +54,7 @@ struct MotionLayout {
 struct InitialState {
     Eigen::VectorXd y, rate;
     double time = 0, step = 0;   // of the unknowns, and of the first step from them
+    double work = 0;             // with inertia: of what holds the distance of beads, until then
     Eigen::VectorXd shown = {};  // the unknowns at t = 0, with the exact curve
 };
 
@@ -65,7 +67,8 @@ struct InitialState {
 // has an exact balance. The gradient flow is ((X_t).nu, phi.nu) + dE[phi] + tension dA[phi] + lambda dV[phi] + c
 // dJ[phi] = 0; with a material parametrisation (X_t, phi) + dE[phi] + (its force along the curve, phi) + ... = 0. A
 // pressure that is given stands for -lambda; where it is a formula of the volume, lambda + P(V) = 0. A free period adds
-// (L_t/L) z e_z to u, and the test function z e_z. Beads add SUM q dG[v] (BeadForms). Where a patch ends, multipliers
+// (L_t/L) z e_z to u, and the test function z e_z. Beads add SUM q dG[v] (BeadForms); with inertia a held distance D
+// has the row dD[u] = D_t, and D itself a multiplier in the first row. Where a patch ends, multipliers
 // hold the curve, and the velocity at zero or, where the rim is open, along the membrane. Many fields: besides the
 // problem, the places of all its terms in the matrix, found once.
 class CurveMotion {
@@ -117,9 +120,9 @@ public:
     // How far the formulas of sources are from where they are not defined; the place is s.
     FormulaDomain::Margin source_domain(double t, const double* y) const;
 
-    // Consistent unknowns and rates from the curve and velocities of y0 at t = 0, whose other entries are a guess:
+    // Consistent unknowns and rates from the curve and velocities of y0 at a time, whose other entries are a guess:
     // after two implicit Euler steps of length h. Throws SolveError if Newton's method fails.
-    InitialState consistent(const Eigen::VectorXd& y0, double h) const;
+    InitialState consistent(const Eigen::VectorXd& y0, double h, double time = 0) const;
 
 private:
     struct Local;
@@ -135,6 +138,10 @@ private:
     BeadLoad bead_load(double t) const;
     BeadNumbers bead_numbers(const double* y) const { return Eigen::Map<const BeadNumbers>(y + at_.bead); }
     void add_beads(double t, const double* y, double* values) const;
+    BeadNumbers lengthening_beads(const double* y) const;
+    double reach_rate(const double* y) const;
+    void hold_reach(double t, const double* y, double* F) const;
+    void add_reach(const double* y, double* values) const;
     void hold_rim(double t, const double* y, double* F) const;
     void add_rim(double t, const double* y, double* values) const;
     void hold_open_rim(double t, const double* y, double* F) const;

@@ -318,25 +318,31 @@ InitialState initial_state(const CurveSetup& setup) {
     setup.motion->set_followers(y);
     if (at.swirl >= 0) y.segment(at.swirl, space.r().size()) = setup.c.velocity.omega * y.head(space.r().size());
     if (setup.start.velocity) set_velocity(setup, y);
-    // Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
-    // rounding, at the small elements of a seam or where much accuracy is asked for, does not prevent the next step
-    // (docs/decisions/curves.md).
-    const double first_output = OutputTimes(setup.c.time).next();
+    InitialState found = state_after(setup, y, 0);
+    found.shown = found.y;
+    found.shown.head(space.size()) = y.head(space.size());
+    return found;
+}
+
+// Short, since a shape that is not smooth changes fast, and over before the first output; yet long enough that
+// rounding, at the small elements of a seam or where much accuracy is asked for, does not prevent the next step
+// (docs/decisions/curves.md).
+InitialState state_after(const CurveSetup& setup, const Eigen::VectorXd& y, double time) {
+    const double until = std::min(OutputTimes(setup.c.time, time).next(), next_kink(setup.motion->law(), time)) - time;
     const bool tight = setup.c.accuracy.energy < 1e-9 && setup.start.meridian.seams.empty();
     double h = std::min((tight ? 1e-7 : 1e-8) * first_step_factor(setup.settings) * std::min(setup.c.time.end, 1.0),
-                        0.1 * first_output);
-    const double most = measure(*setup.motion, 0, y.data(), Eigen::VectorXd::Zero(at.size).eval().data()).total() +
-                        most_risen * setup.reference_energy;
+                        0.1 * until);
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(y.size());
+    const double most =
+        measure(*setup.motion, time, y.data(), rest.data()).total() + most_risen * setup.reference_energy;
     for (int tries = 0;; ++tries) try {
-            InitialState found = setup.motion->consistent(y, h);
+            const InitialState found = setup.motion->consistent(y, h, time);
             const Snapshot soon = measure(*setup.motion, found.time, found.y.data(), found.rate.data());
-            if (!is_admissible(soon) || !(soon.total() <= most))
+            if (!is_admissible(soon) || !(soon.total() <= most + std::max(found.work, 0.0)))
                 throw SolveError("the first step leads to no admissible shape of lower energy");
-            found.shown = found.y;
-            found.shown.head(space.size()) = y.head(space.size());
             return found;
         } catch (const SolveError&) {
-            if (tries == 4 || 20 * h > first_output) throw;
+            if (tries == 4 || 20 * h > until) throw;
             h *= 10;
         }
 }

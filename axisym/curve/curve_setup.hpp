@@ -63,6 +63,9 @@ struct CurveSetup {
 
 // What the run computes from. Throws SolveError where the equations have no solution that the motion may reach.
 InitialState initial_state(const CurveSetup& setup);
+// Likewise after the curve and velocity of y at a time: a velocity with inertia jumps where the distance of beads is
+// held and its rate changes.
+InitialState state_after(const CurveSetup& setup, const Eigen::VectorXd& y, double time);
 // The initial shape alone, with no velocity: what can be shown where initial_state() throws.
 InitialState state_without_velocity(const CurveSetup& setup);
 

@@ -131,6 +131,7 @@ void CurveSimulation::resume(const Record& restart) {
     past_.least = now_.total() - past_.work;
     add_to_trace(restart.time);
     look_at_mesh();
+    at_kink_ = next_kink(setup_.motion->law(), std::nextafter(restart.time, -HUGE_VAL)) == restart.time;
 }
 
 Energetics CurveSimulation::energetics() const {
@@ -210,7 +211,10 @@ void CurveSimulation::restart_integrator() {
     const double time = past_.time;
     past_.dissipated = dissipated(time), past_.work = work(time);
     past_.counters = counters();
-    make_integrator(y, rate, time, 0);
+    const bool jumps = at_kink_ && setup_.motion->layout().reach >= 0;
+    const InitialState at = jumps ? state_after(setup_, y, time) : InitialState{y, rate, time};
+    past_.work += at.work;
+    make_integrator(at.y, at.rate, at.time, at.step);
 }
 
 IntegratorCounters CurveSimulation::counters() const {

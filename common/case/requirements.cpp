@@ -162,11 +162,8 @@ const std::vector<Requirement> rows{
     key("model.tension", {free_area}, "what a fixed area needs is the series tension"),
     key("model.pressure", {free_volume}, "what a fixed volume needs is the series pressure"),
     key("model.force", {pulled}, "what a fixed period needs is the series force"),
-    key("model.bead_width", {closed, named_model}, "beads pull at the poles"),
+    key("model.bead_width", {closed}, "beads pull at the poles"),
     key("model.extension", {beads}, "it is that of the distance of two beads"),
-    value(
-        "model.extension", [](P p) { return p.law.beads && p.law.beads->extension; }, {no_inertia},
-        "the velocity would jump with its rate: give model.force"),
     number("model.tension", varies(&MotionLaw::tension), {motion}, "equilibria are those of a constant value"),
     number("model.pressure", varies(&MotionLaw::pressure), {motion}, "equilibria are those of a constant value"),
     number("model.force", varies(&MotionLaw::force), {motion}, "equilibria are those of a constant value"),

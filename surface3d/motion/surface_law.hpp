@@ -40,6 +40,9 @@ struct SurfaceLaw : MotionLaw {
         return source.mass_at(at);
     }
     bool holds_distance() const { return beads && beads->extension; }
+    bool holds_rate() const {
+        return holds_distance() && inertia != 0;
+    }  // too: the velocity cannot follow a jump of it
 };
 
 }  // namespace tubule::surface3d

@@ -95,6 +95,7 @@ void SurfaceSimulation::begin(const Start& from) {
     state_ = u.size() > 0 ? surface().start(start.mesh, u.transpose().reshaped(), {}, begin_time())
                           : surface().start(start.mesh, begin_time());
     if (moves_from_the_first()) set_moving();
+    if (surface().law().holds_rate()) jump();
     measure_first_state();
     memory_.balance.total_start = memory_.balance.lowest_total = total();
     if (companions_) memory_.error = std::max(memory_.error, companions_->begin(summary.elements, now_));
@@ -130,6 +131,24 @@ void SurfaceSimulation::set_moving() {
         state_.stretch = soon.stretch;
     } catch (const SolveError&) {
     }
+}
+
+// With inertia the velocity jumps where the rate of a distance that is held does: to that of a very short step. What
+// acts from then on is that of another one. Returns the work of what pulls, which is at the mean of both rates.
+double SurfaceSimulation::jump() {
+    const auto rate = [&] {
+        const CurvedMesh now = surface().mesh(state_);
+        return surface().distance_rate(now, surface().bead_numbers(now),
+                                       surface().velocity(state_, surface().fields(now)));
+    };
+    const double before = rate(), force = state_.force;
+    state_.memory.reset(), state_.step = 0;
+    memory_.next_step = first_step_from(std::min(memory_.next_step, shortest_usual_step()));
+    set_moving();
+    const double impulse = moment * memory_.next_step * state_.force;
+    state_.force = force;
+    set_moving();
+    return impulse * (before + rate()) / 2;
 }
 
 // Initial dissipation. Short steps show the noise of the force, longer implicit steps damp it. Steps tau, 4 tau, 16 tau
@@ -436,6 +455,11 @@ bool SurfaceSimulation::change_mesh(const CurvedMesh& mesh, const Eigen::MatrixX
 }
 
 std::optional<StopReport> SurfaceSimulation::advance(double until) {
+    if (surface().law().holds_rate() && state_.time > begin_time() &&
+        case_.law.beads->next_kink(std::nextafter(state_.time, -HUGE_VAL)) == state_.time) {
+        memory_.balance.work += jump();
+        measure_state();
+    }
     const double kink = next_kink(), left = std::min(kink, until) - state_.time;
     const auto tau = [&] { return left / std::ceil(left / memory_.next_step * (1 - 1e-9)); };  // no short last step
     while (const auto refusal = try_step(tau())) {

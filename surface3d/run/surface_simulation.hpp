@@ -76,6 +76,7 @@ private:
     void use_mesh(const CurvedMesh& mesh);
     bool moves_from_the_first() const;
     void set_moving();
+    double jump();
     double first_step_from(double by_error) const;
     double initial_dissipation();
     void measure_state();

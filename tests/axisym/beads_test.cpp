@@ -64,14 +64,15 @@ TEST(Beads, equationsHaveTheirDerivatives) {
             system.set_followers(u);
             EXPECT_NEAR(slope(merit, 1e-3)[0], system.residual(u).head(x.size()).dot(w.head(x.size())), 1e-6);
         }
-        for (const bool inextensible : {false, true}) {
+        for (const auto& [inextensible, inertia] : {std::pair{false, 0.0}, {true, 0.0}, {true, 1.0}}) {
             CurveLaw moves = law;
-            moves.inextensible = inextensible, moves.viscosity = inextensible ? 0.4 : 0;
+            moves.inextensible = inextensible, moves.viscosity = inextensible ? 0.4 : 0, moves.inertia = inertia;
             CurveMotion motion(*space, problem.bending, moves, 0.3, 5, 2);
             motion.hold_beads(x);
             const int n = motion.layout().size, at = motion.layout().bead;
             Vector y = random_vector(n, 0.3, 5);
             y.head(x.size()) = x, y.segment<4>(at) = u.tail<4>();
+            if (motion.layout().reach >= 0) y[motion.layout().reach] = 0;
             const Vector rate = random_vector(n, 0.3, 6), v = random_vector(n, 1, 7);
             Eigen::SparseMatrix<double> J = motion.pattern();
             motion.jacobian(0, y.data(), rate.data(), 1.7, J.valuePtr());
@@ -248,6 +249,67 @@ TEST(Beads, distanceIsHeld) {
     EXPECT_NEAR(rest.last("bead_distance"), o.last("bead_distance"), 1e-7);
     EXPECT_NEAR(rest.last("force"), o.last("force"), 1e-3 * o.last("force"));
     EXPECT_LT(std::abs(rest.last("identity_defect")), 1e-4 * o.summary.reference_energy);
+}
+
+const double speed = 2, until = 0.02;  // of the distance of beads
+const std::vector<std::string> drawn_fluid{
+    "model={kind=\"fluid\", area=\"reservoir\", tension=10, bead_width=0.3, "
+    "extension={time=[0, 0.02, 0.03], value=[0, 0.04, 0.04]}}",
+    "accuracy.energy=1e-4"};
+
+// Beads take a sphere's fluid along at once: with u.nu = SUM a_l P_l its kinetic energy is SUM a_l^2 (1 + 4/(l (l +
+// 1))) 2 pi/(2 l + 1), as div u = 0, least at the rate SUM a_l d_l, d the derivative of the distance. Where the rate
+// falls to 0 they take it out again, and otherwise the energy balances.
+TEST(Beads, velocitiesOfAFluidJump) {
+    const OnSphere exact(0.3);
+    double lightness = 0;
+    for (int l = 2; l < 60; l += 2) {
+        const double part =
+            OnSphere::integral([&](double t) { return exact.slope(t) * std::legendre(l, std::cos(t)); });
+        lightness += 4 * part * part * (2 * l + 1) / (4 * pi) / (1 + 4.0 / (l * (l + 1)));
+    }
+    std::vector<std::string> sets = drawn_fluid;
+    sets.push_back("time={end=0.03, output=[0.01, 0.02]}");
+    const Case c = of(pulled, sets);
+    const Outcome o = run_case(c);
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    EXPECT_NEAR(o["kinetic_energy"].front(), speed * speed / (2 * lightness), 1e-5);
+    const double first = o["bead_distance"].front();
+    EXPECT_NEAR(o.at("bead_distance", 0.01) - first, speed * 0.01, 1e-8);
+    EXPECT_NEAR(o.last("bead_distance") - first, speed * until, 1e-8);
+    const double before = o.at("kinetic_energy", until), taken = o.at("work", until) - o.last("work");
+    EXPECT_GT(taken, 0.5 * before);
+    EXPECT_LT(o.last("kinetic_energy"), 0.5 * before);
+    for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-5 * o.summary.reference_energy);
+    // From the frame of that moment on it ends alike.
+    const Outcome rest = run_case(c, &o.log.frames.at(2));
+    EXPECT_EQ(rest.summary.stop.reason, Stop::finished) << rest.summary.stop.message;
+    for (const std::string name : {"bead_distance", "work", "free_energy", "kinetic_energy"})
+        EXPECT_NEAR(rest.last(name), o.last(name), 1e-6) << name;
+}
+
+// The measured force as a given one, after the impulse 2 E_K/speed of the start, draws the beads as far.
+TEST(Beads, aMeasuredForceDrawsAsFar) {
+    std::vector<std::string> sets = drawn_fluid;
+    std::string times, values;
+    const int steps = 20;
+    for (int i = 1; i <= steps; ++i) times += fmt::format("{}{}", i > 1 ? ", " : "", until * i / steps);
+    sets.push_back(fmt::format("time={{end={}, output=[{}]}}", until, times));
+    const Outcome held = run_case(of(pulled, sets));
+    ASSERT_EQ(held.summary.stop.reason, Stop::finished) << held.summary.stop.message;
+    const double pulse = 1e-6, impulse = 2 * held["kinetic_energy"].front() / speed, force = held["force"].front();
+    times = fmt::format("0, {0}, {1}, ", pulse, 1.001 * pulse) + times;
+    values = fmt::format("{0}, {0}, {1}", impulse / pulse, force);
+    for (int i = 1; i <= steps; ++i) values += fmt::format(", {}", held.at("force", until * i / steps));
+    sets[0] = fmt::format(
+        "model={{kind=\"fluid\", area=\"reservoir\", tension=10, bead_width=0.3, "
+        "force={{time=[{}], value=[{}]}}}}",
+        times, values);
+    const Outcome given = run_case(of(pulled, sets));
+    ASSERT_EQ(given.summary.stop.reason, Stop::finished) << given.summary.stop.message;
+    EXPECT_NEAR(given.at("bead_distance", until / 2) - held.at("bead_distance", until / 2), 0, 1e-3 * speed * until);
+    EXPECT_NEAR(given.last("bead_distance") - held.last("bead_distance"), 0, 1e-3 * speed * until);
+    EXPECT_NEAR(given.last("kinetic_energy"), held.last("kinetic_energy"), 1e-3 * held.last("kinetic_energy"));
 }
 
 TEST(Beads, refusals) {

@@ -72,9 +72,11 @@ class ModelChoice(ProgramTest):
 
     def test_fluid_where_it_cannot_be_told(self):
         quick = ("time.end=0.02", "time.output=[]")
+        loads = "a tension, pressure or force, a reservoir or a free period acts on the membrane"
         for given, why in (
             (("velocity.initial=rotation", "velocity.omega=0.1"), "the case gives a velocity"),
-            (("model.volume=free", "model.pressure=0.1"), "a tension, pressure or force, a reservoir or a free period acts on the membrane"),
+            (("model.volume=free", "model.pressure=0.1"), loads),
+            (("model.volume=free", "model.bead_width=0.3", "model.extension={time=[0, 0.02], value=[0, 0.01]}"), loads),
         ):
             self.assertEqual(self.chosen(*quick, *given), ("fluid", f"whether a simpler model does is unknown: {why}"))
 

@@ -186,6 +186,32 @@ TEST(Places, BeadsAreDrawnApart) {
 }
 
 // Expected: tier axisym, as above.
+TEST(Places, AFluidIsDrawnApart) {
+    const std::vector<std::string> sets{
+        "model={kind=\"fluid\", Re=1, area=\"reservoir\", tension=10, bead_width=0.3, "
+        "extension={time=[0, 0.01, 0.015], value=[0, 0.02, 0.02]}}",
+        "accuracy.estimate=false"};
+    const Outcome o = run_case(pulled, sets);
+    ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+    const double E_ref = o.summary.reference_energy;
+    const auto time = o.series("time"), distance = o.series("bead_distance"), kinetic = o.series("kinetic_energy");
+    for (std::size_t i = 0; i < time.size(); ++i)
+        EXPECT_NEAR(distance[i] - distance[0], 2 * std::min(time[i], 0.01), 1e-10);
+    EXPECT_NEAR(kinetic.front(), 0.9407256, 1e-5 * E_ref);
+    EXPECT_NEAR(o.last("free_energy"), 150.8619626, 1e-4 * E_ref);
+    EXPECT_NEAR(o.last("kinetic_energy"), 0.0227448, 2e-5 * E_ref);
+    EXPECT_NEAR(o.last("work"), -0.7965711, 5e-5 * E_ref);
+    EXPECT_NEAR(o.last("momentum_z"), 0, 1e-9);
+    for (const double defect : o.series("identity_defect")) EXPECT_LT(std::abs(defect), 1e-4 * E_ref);
+    const Record& frame = o.watch.frames.at(1);  // of the moment when the rate falls
+    const Restart restart{frame, o.watch.meshes.at(*frame.mesh)};
+    Outcome rest = begin(pulled, sets);
+    rest.summary = run_surface(rest.c, rest.watch, &restart);
+    for (const std::string name : {"free_energy", "force", "work", "kinetic_energy"})
+        EXPECT_NEAR(rest.last(name), o.last(name), 1e-9 * E_ref) << name;
+}
+
+// Expected: tier axisym, as above.
 TEST(Places, AFluidIsPulledByAForce) {
     const Outcome o = run_case(pulled, {"model={kind=\"fluid\", Re=1, area=\"reservoir\", tension=10, bead_width=0.3, "
                                         "force={time=[0, 0.05], value=[0, 10]}}",

@@ -69,8 +69,6 @@ const std::vector<Refused> refused{
     {axisym, {"model.volume=fixed", "model.pressure=1"}, "model.volume = \"free\""},
     {axisym, {"model.force=1"}, "model.period = \"free\" or model.bead_width"},
     {axisym, {"model.bead_width=0.1"}, "a closed surface"},
-    {sphere, {"model={kind=\"auto\", bead_width=0.1}"}, "a model that is named"},
-    {sphere, {"model={kind=\"fluid\", bead_width=0.1}", "model.extension=1"}, "a model without inertia"},
     {equilibrium,
      {"model.bead_width=0.1", "model.extension={time=[0,1],value=[0,1]}"},
      "a motion, without [equilibrium]"},
