@@ -148,7 +148,7 @@ def pull(draw, case, size, modulus):
     """Draws a closed surface apart by beads at its poles."""
     model, end = case["model"], case["time"]["end"]
     model["bead_width"] = number(size * math.exp(draw.uniform(math.log(0.08), math.log(0.25))))
-    if model["kind"] == "fluid" or draw.random() < 0.4:
+    if draw.random() < 0.4:
         model["force"] = draw_load(draw, 8 * modulus * size, end)
     else:
         until = number(end * draw.uniform(0.2, 1))

@@ -66,7 +66,7 @@ def field(n):
 
 def main():
     numbers = [int(text) for text in sys.argv[2:]]
-    program, (count, first) = Path(sys.argv[1]), numbers + [12, 0][len(numbers) :]
+    program, (count, first) = Path(sys.argv[1]).resolve(), numbers + [12, 0][len(numbers) :]
     kinds = {"place": lambda n: scenes.scene_number(n, 0.5, scenes.place), "pull": lambda n: scenes.scene_number(n, 0.5, scenes.pull), "field": field}
     silent = finished = 0
     for n in range(first, first + count):
