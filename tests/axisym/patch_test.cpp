@@ -174,25 +174,38 @@ TEST(Patches, filmsAreCatenoids) {
     EXPECT_EQ(o.summary.warnings, std::vector<std::string>{o.summary.stop.message});
 }
 
-// A tether from a clamped flat patch of radius 20, kappa = 1, tension 1/2: the force 2 pi sqrt(2 kappa sigma) at the
-// end, and before that the curve of a force at a point, as width falls: 7.0726297 at the extension 8, by
-// scipy.solve_bvp from Hamilton's equations with the pole's expansion. That curve rises to 1.126 times the final force.
+// A tether from a clamped flat patch of radius 20, kappa = 1, tension 1/2: the force 2 pi sqrt(2 kappa sigma) and the
+// radius sqrt(kappa/(2 sigma)) at the end, and before that the curve of a force at a point, as width falls: 7.0726297
+// at the extension 8, by scipy.solve_bvp from Hamilton's equations with the pole's expansion. That curve rises to 1.127
+// times the final force.
 TEST(Patches, tethersOvershoot) {
-    const auto forces = [](double width, double to) {
+    const auto drawn = [](double width, double to) {
         const Outcome o =
             run_shapes(read_case(test::cases + "/branch_patch_tether.toml",
                                  {fmt::format("model.bead_width={}", width),
                                   fmt::format("equilibrium.branch={{vary=\"model.extension\", to={}, step=4}}", to)}));
         EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
-        return o["force"];
+        return o;
     };
-    const double wide = forces(0.1, 8).back(), half = forces(0.05, 8).back(), narrow = forces(0.025, 8).back();
+    const auto force = [&](double width) { return drawn(width, 8).last("force"); };
+    const double wide = force(0.1), half = force(0.05), narrow = force(0.025);
     // The error is a w^2 log w + b w^2: eliminated from three widths, each half of the one before.
     const double first = (4 * half - wide) / 3, second = (4 * narrow - half) / 3, point = (4 * second - first) / 3;
     EXPECT_NEAR(point, 7.0726297, 1e-4 * 7.07);
-    const std::vector<double> tether = forces(0.1, 28);
-    EXPECT_NEAR(tether.back(), 2 * pi, 1e-6 * 2 * pi);
-    EXPECT_GT(*std::ranges::max_element(tether), 1.12 * 2 * pi);
+    const Outcome tether = drawn(0.1, 56);
+    EXPECT_NEAR(tether.last("force"), 2 * pi, 1e-6 * 2 * pi);
+    EXPECT_GT(*std::ranges::max_element(tether["force"]), 1.12 * 2 * pi);
+    const auto array = [&](const std::string& name) {
+        return std::ranges::find(tether.log.frames.back().arrays, name, &Array::name)->data;
+    };
+    const std::vector<double> r = array("r"), z = array("z");
+    int found = 0;
+    for (std::size_t i = 0; i < r.size(); ++i) {
+        if (std::abs(z[i] - 28) > 1) continue;
+        EXPECT_NEAR(r[i], 1, 1e-6);
+        ++found;
+    }
+    EXPECT_GT(found, 3);
 }
 
 // The force between two rings is the slope of the free energy in their distance.

@@ -1,4 +1,5 @@
 // Potentials of places: derivatives, spheres around a particle, vesicles at a wall.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -256,6 +257,24 @@ TEST(Potential, toriMoveInFields) {
     EXPECT_NEAR(o["potential_energy"].front(), W, 1e-9 * W);
     EXPECT_LT(o["potential_energy"].back(), 0.8 * W);
     for (const double defect : o["identity_defect"]) EXPECT_LT(std::abs(defect), 1e-5 * o.summary.reference_energy);
+}
+
+// What a uniform pull draws through its friction: u = (1 - exp(-gamma t))/gamma with inertia, 1/gamma without, in a
+// fixed shape.
+TEST(Potential, spheresAreDrawnThroughTheirFriction) {
+    for (const bool inert : {false, true}) {
+        const Outcome o = run_case(
+            parse_case("tier = \"axisym\"\nenergy = {k20 = 0.5, potential = [{kind = \"formula\", formula = \"-z\"}]}\n"
+                       "shape = {kind = \"sphere\", radius = 1}\naccuracy = {energy = 1e-6}\ntime = {end = 0.5}\n",
+                       {fmt::format("model={{kind=\"{}\", gamma=2, volume=\"free\"}}", inert ? "fluid" : "overdamped")},
+                       "case.toml"));
+        ASSERT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+        const double speed = inert ? (1 - std::exp(-1.0)) / 2 : 0.5, way = inert ? (0.5 - speed) / 2 : 0.25;
+        EXPECT_NEAR(o["speed"].back(), speed, inert ? 5e-6 : 1e-9);
+        EXPECT_NEAR(o["potential_energy"].back(), -4 * pi * way, 1e-6 * o.summary.reference_energy);
+        EXPECT_NEAR(o["free_energy"].back(), 8 * pi - 4 * pi * way, 1e-6 * o.summary.reference_energy);
+        EXPECT_NEAR(o["potential_force"].back(), 4 * pi, 1e-9);
+    }
 }
 
 TEST(Potential, wallsAreNotPassed) {

@@ -145,7 +145,9 @@ class Membranes(unittest.TestCase):
     def test_partial_degrees_are_neutral_where_wrapping_pays(self):
         """Without tension a free membrane is a catenoid. In the limit a particle at any height, thus of any degree of
         wrapping, is free of force at the strength 4 k20/R^2 and marginally stable, dN/dz = 0: below, it leaves the
-        membrane; above, it is drawn in."""
+        membrane; above, it is drawn in. To wrap it up to an angle a costs 2 pi (1 - cos a) (4 k20 - w R^2), so that the
+        flat membrane becomes unstable there, too. No eigenvalue changes its sign at a range > 0: the strength without
+        force then rises with the degree, and the stiffness falls to 0 with the range."""
         for degrees in (60, 90):
             z, self.last, strengths, stiffness = height_of_catenoid(math.radians(degrees)), None, [], []
             for range_ in RANGES:
