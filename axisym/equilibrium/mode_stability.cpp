@@ -539,11 +539,15 @@ Matrix ModeStability::fixed_functionals(int m, const MotionLaw& law, const Splin
         fix_at_rings(field, fixed);
         return fixed;
     }
-    // They hold it in its place, but along planes, and along the axis where they do not depend on z.
+    // They hold it in its place, but along planes, and along the axis where they do not depend on z; beads in their
+    // axis.
     const std::vector<Potential>& potentials = problem_.bending.potentials;
-    const bool free = std::ranges::none_of(potentials, m == 0 ? &Potential::acts_along_axis : &Potential::acts);
+    const bool held = m == 1 && hold_axis(problem_, axial_force(problem_, shape_), std::sqrt(shape_.observed.area),
+                                          shape_.reference_energy);
+    const bool free =
+        !held && std::ranges::none_of(potentials, m == 0 ? &Potential::acts_along_axis : &Potential::acts);
     const bool planes =
-        std::ranges::all_of(potentials, [](const Potential& p) { return p.kind == Potential::Kind::plane; });
+        !held && std::ranges::all_of(potentials, [](const Potential& p) { return p.kind == Potential::Kind::plane; });
     const Eigen::LDLT<Matrix> projection(forms.mass);
     for (int k = 0; k < 2; ++k) {
         const bool across = m == 1 && k == 0, exists = m == 0 ? k == 0 : m == 1 && (across || space.closed());

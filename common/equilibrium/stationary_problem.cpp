@@ -51,6 +51,10 @@ double reduced_volume(double area, double volume) {
     return sphere_factor * volume / std::pow(area, 1.5);
 }
 
+bool hold_axis(const StationaryProblem& problem, double force, double size, double reference_energy) {
+    return problem.beads && std::abs(force) * size > 1e-4 * reference_energy;
+}
+
 bool scale_free(const StationaryProblem& p) {
     return p.bending.k[term_number("k40")] == 0 && p.bending.k[term_number("k42")] == 0 && p.bending.terms.empty() &&
            p.bending.kg == 0 && p.bending.H0 == 0 && !p.bending.H0_varies() && !p.bending.alpha &&

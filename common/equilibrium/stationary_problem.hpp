@@ -51,6 +51,10 @@ struct StationaryProblem {
     }
 };
 
+// Whether beads that pull with this force resist motions across the axis and turns out of it; weaker ones do so by less
+// than the error of a mesh.
+bool hold_axis(const StationaryProblem& problem, double force, double size, double reference_energy);
+
 // Whether shapes of all sizes have the same energy, and nothing acts on them.
 bool scale_free(const StationaryProblem& problem);
 

@@ -50,8 +50,12 @@ public:
             }
             if (out_.stop == Stop::finished) u.tail(multipliers_.size()) = multipliers_;
             const bool far = out_.stop != Stop::finished && !settings_.near;
-            const bool sound = system.admissible(u),
-                       found = sound && settle(system, u, far, settings_.descend, out_.iterations);
+            const bool sound = system.admissible(u);
+            bool found = sound && settle(system, u, far, settings_.descend, out_.iterations);
+            if (found && problem_.held_distance()) {  // its force, known now, may hold the surface on the axis
+                system.rebase(u);
+                found = settle(system, u, false, settings_.descend, out_.iterations);
+            }
             out_.stop = found ? Stop::finished : sound ? Stop::solver_failed : Stop::mesh_lost;
             keep(system, u);
             ++rounds_;

@@ -51,17 +51,6 @@ Eigen::MatrixXd motions_of(const CurvedMesh& mesh, const VectorField& normal, co
     return out;
 }
 
-// Combinations of these motions, a column each, along which no potential of places changes.
-Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, const Middle& middle) {
-    constexpr int all = SurfaceSystem::most_motions;
-    const std::optional<Formula> W = potential_density_in_space(bending.potentials);
-    if (!W) return Eigen::MatrixXd::Identity(all, all);
-    const Eigen::MatrixXd rigid = unmoved_by(*W, mesh, middle.centre, middle.size);
-    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, rigid.cols());
-    out.topRows(rigid.rows()) = rigid;
-    return out;
-}
-
 // Whether both have the same first and second derivatives at given multipliers.
 bool same_energy(const Bending& a, const Bending& b) {
     if (a.H0 != b.H0 || count_terms(a) != count_terms(b) || a.alpha.has_value() != b.alpha.has_value()) return false;
@@ -96,14 +85,14 @@ SurfaceSystem::SurfaceSystem(const CurvedMesh& base, const StationaryProblem& pr
     check_problem(problem, base.period);
     directions_.stretch = problem.free_period;
     if (problem.beads) beads_.emplace(problem.beads->width, BeadEquations::in_space);
-    set_mesh(base);
+    set_mesh(base, problem.loads.force);
 }
 
-void SurfaceSystem::set_mesh(const CurvedMesh& mesh) {
+void SurfaceSystem::set_mesh(const CurvedMesh& mesh, double force) {
     energy_ = std::make_shared<DiscreteEnergy>(mesh, problem_.bending);
     ordering_ = nested_dissection(energy_->pattern());
     if (problem_.free_period) ordering_.push_back(space().size());
-    set_base(mesh);
+    set_base(mesh, force);
 }
 
 void SurfaceSystem::set_problem(const StationaryProblem& problem) {
@@ -112,14 +101,16 @@ void SurfaceSystem::set_problem(const StationaryProblem& problem) {
     problem_ = problem;
 }
 
-void SurfaceSystem::set_base(const CurvedMesh& mesh) {
+void SurfaceSystem::set_base(const CurvedMesh& mesh, double force) {
     base_ = mesh;
     directions_.normal = node_normals(space(), base_);
     energy_->set_penalty(base_, problem_.bending);
     mass_ = energy_->mass(base_, directions_);
-    set_motions();
     last_.reset(), sums_.reset();
-    scale_ = reference_energy(unknowns_at_base());
+    const Eigen::VectorXd u = unknowns_at_base();
+    scale_ = reference_energy(u);
+    without_cost_.on_axis = hold_axis(problem_, force, size(u), scale_);
+    set_motions();
 }
 
 void SurfaceSystem::set_motions() {
@@ -127,22 +118,27 @@ void SurfaceSystem::set_motions() {
     const bool free_size = !c.area && !c.volume, any_shape = free_size && !c.reduced_volume && base_.period == 0;
     const bool scales = scale_free(problem_) && free_size && base_.period == 0;
     const Middle middle(base_);
-    const Eigen::MatrixXd all = motions_of(base_, directions_.normal, middle, scales, scales && any_shape),
-                          fields = all * free_motions(base_, problem_.bending, middle);
+    const Eigen::MatrixXd all = motions_of(base_, directions_.normal, middle, scales, scales && any_shape);
     // Compared with the largest motion of all: where a potential leaves turns alone, these may have no normal part.
     const Eigen::MatrixXd products = all.transpose() * (mass_ * all);
     const double least = no_motion * no_motion * products.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff();
     set_turn(all.leftCols<6>(), middle.centre, middle.size, least);
-    motions_.resize(shape_size(), 0);
-    if (fields.cols() == 0) return;
-    const Eigen::MatrixXd image = mass_ * fields;
-    const Eigenpairs gram = eigenpairs(fields.transpose() * image, true);
-    for (Eigen::Index j = 0; j < fields.cols(); ++j) {
-        const double norm2 = gram.values[j];
-        if (!(norm2 > least)) continue;
-        motions_.conservativeResize(shape_size(), motions_.cols() + 1);
-        motions_.col(motions_.cols() - 1).setZero();
-        motions_.col(motions_.cols() - 1).head(mass_.rows()) = image * gram.vectors.col(j) / std::sqrt(norm2);
+    for (const bool on_axis : {false, true}) {
+        Eigen::MatrixXd& motions = without_cost_.functionals[on_axis];
+        motions.resize(shape_size(), 0);
+        const Eigen::MatrixXd rigid =
+            free_motions(base_, problem_.bending.potentials, on_axis, middle.centre, middle.size);
+        Eigen::MatrixXd fields(all.rows(), rigid.cols() + 4);
+        fields << all.leftCols<6>() * rigid, all.rightCols<4>();
+        const Eigen::MatrixXd image = mass_ * fields;
+        const Eigenpairs gram = eigenpairs(fields.transpose() * image, true);
+        for (Eigen::Index j = 0; j < fields.cols(); ++j) {
+            const double norm2 = gram.values[j];
+            if (!(norm2 > least)) continue;
+            motions.conservativeResize(shape_size(), motions.cols() + 1);
+            motions.rightCols<1>().setZero();
+            motions.rightCols<1>().head(mass_.rows()) = image * gram.vectors.col(j) / std::sqrt(norm2);
+        }
     }
 }
 
@@ -278,9 +274,9 @@ MultiplierEquations SurfaceSystem::equations(const EnergyValues& v, const Eigen:
 void SurfaceSystem::set_constraints(const EnergyValues& v, const Eigen::VectorXd& u, Eigen::VectorXd& F) const {
     F.segment<2>(sigma()) = equations(v, u).F;
     F[mu()] = u[mu()] - area_difference_force(problem_.bending, v.M);
-    const Eigen::Index held = motions_.cols();
+    const Eigen::Index held = held_motions();
     F.tail(most_motions) = u.tail(most_motions);
-    F.segment(motions(), held) = motions_.transpose() * u.head(shape_size());
+    F.segment(motions(), held) = without_cost_.functionals[without_cost_.on_axis].transpose() * u.head(shape_size());
     if (beads_) F.segment<4>(beads()) = beads_->residual(on(u), bead_load(), bead_numbers(u));
 }
 
@@ -304,8 +300,8 @@ Eigen::VectorXd SurfaceSystem::residual(const Eigen::VectorXd& u) const {
               : energy_->derivatives(mesh(u), directions_, bending(u), u[sigma()], u[lambda()], H0_, false);
     const EnergyDerivatives& d = known ? *last_ : first;
     Eigen::VectorXd F(unknowns());
-    F.head(shape_size()) =
-        d.energy + u[sigma()] * d.area + u[lambda()] * d.volume + motions_ * u.segment(motions(), motions_.cols());
+    F.head(shape_size()) = d.energy + u[sigma()] * d.area + u[lambda()] * d.volume +
+                           without_cost_.functionals[without_cost_.on_axis] * u.segment(motions(), held_motions());
     if (problem_.free_period) F[shape_size() - 1] -= problem_.loads.force * base_.period;
     set_constraints(d.values, u, F);
     return F;
@@ -321,9 +317,10 @@ Eigen::SparseMatrix<double> SurfaceSystem::jacobian(const Eigen::VectorXd& u, do
     for (int i = 0; i < 2; ++i) rows.row(i) = (e.by_extent(i, 0) * d.area + e.by_extent(i, 1) * d.volume).transpose();
     corner.topLeftCorner<2, 2>() = e.by_multipliers;
     if (problem_.bending.alpha) columns.col(2) = d.M, rows.row(2) = -*problem_.bending.alpha * d.M.transpose();
-    const Eigen::Index held = motions_.cols();
+    const Eigen::Index held = held_motions();
     const int first = motions() - n;
-    columns.middleCols(first, held) = motions_, rows.middleRows(first, held) = motions_.transpose();
+    columns.middleCols(first, held) = without_cost_.functionals[without_cost_.on_axis];
+    rows.middleRows(first, held) = without_cost_.functionals[without_cost_.on_axis].transpose();
     corner.diagonal().segment(first, held).setZero();
     if (beads_) {
         const BeadEquations::Slopes s = beads_->slopes(on(u), bead_load(), bead_numbers(u));
@@ -405,7 +402,7 @@ bool SurfaceSystem::rebase(Eigen::VectorXd& u, Eigen::VectorXd* along, int trian
         take_new_mesh(next, triangles, u, along))
         return true;
     const VectorField before = directions_.normal;
-    set_base(next);
+    set_base(next, bead_force(u));
     u.head(shape_size()).setZero();
     if (along) along->head(N).array() *= before.cwiseProduct(directions_.normal).colwise().sum().transpose().array();
     return false;
@@ -421,7 +418,7 @@ bool SurfaceSystem::take_new_mesh(const CurvedMesh& shape, int triangles, Eigen:
     auto* found = std::get_if<Remeshed>(&better);
     if (!found) return false;
     const Eigen::VectorXd multipliers = u.tail(u.size() - before);
-    set_mesh(found->mesh);
+    set_mesh(found->mesh, bead_force(u));
     u.setZero(unknowns());
     u.tail(multipliers.size()) = multipliers;
     if (along) {
@@ -458,7 +455,7 @@ ConstrainedForm SurfaceSystem::second_variation(const Eigen::VectorXd& u, const 
         return out;
     };
     A.form = extended(d.hessian, true), A.mass = extended(mass_, false);
-    A.constraints = motions_;
+    A.constraints = without_cost_.functionals[is_on_axis(u)];
     const auto append = [](Eigen::MatrixXd& to, const Eigen::VectorXd& column) {
         to.conservativeResize(column.size(), to.cols() + 1);
         to.col(to.cols() - 1) = column;
@@ -497,7 +494,7 @@ SurfaceSpectrum SurfaceSystem::spectrum(const Eigen::VectorXd& u, int count) con
 }
 
 // Velocities of those that cost no energy, numbered component by component, a column each; orthonormal.
-Eigen::MatrixXd SurfaceSystem::rigid_motions(const CurvedMesh& mesh) const {
+Eigen::MatrixXd SurfaceSystem::rigid_motions(const CurvedMesh& mesh, bool on_axis) const {
     const Middle middle(mesh);
     const int n = mesh.size();
     Eigen::MatrixXd all = Eigen::MatrixXd::Zero(3 * n, 6);
@@ -511,7 +508,7 @@ Eigen::MatrixXd SurfaceSystem::rigid_motions(const CurvedMesh& mesh) const {
             }
         }
     }
-    all = (all * free_motions(mesh, problem_.bending, middle).topRows<6>()).eval();
+    all = (all * free_motions(mesh, problem_.bending.potentials, on_axis, middle.centre, middle.size)).eval();
     const Eigenpairs gram = eigenpairs(all.transpose() * all, true);
     const Eigen::Index none = (gram.values.array() <= 1e-8 * n).count(), some = all.cols() - none;
     return all * gram.vectors.rightCols(some) * gram.values.tail(some).cwiseSqrt().cwiseInverse().asDiagonal();
@@ -528,9 +525,11 @@ SurfaceSpectrum SurfaceSystem::modes(const Eigen::VectorXd& u, const MotionLaw& 
     if ((law.keeps_volume || problem_.constraints.volume) && !one) held.volume = d.values.volume;
     ConstrainedForm A = second_variation(u, held);
     SurfaceSpectrum still = lowest_eigenvalues(A, ordering_, count, stiffness(u));  // without what flows
-    A.constraints = A.constraints.rightCols(A.constraints.cols() - motions_.cols()).eval();
+    A.constraints =
+        A.constraints.rightCols(A.constraints.cols() - without_cost_.functionals[is_on_axis(u)].cols()).eval();
     const CurvedMesh at = mesh(u);
-    const FlowForm flow = flow_form(A, space(), at, directions_.normal, law, rigid_motions(at), stiffness(u));
+    const FlowForm flow =
+        flow_form(A, space(), at, directions_.normal, law, rigid_motions(at, is_on_axis(u)), stiffness(u));
     // That of a sphere has modes of this friction, or less.
     const double drag = law.friction + 16 * pi * law.viscosity / d.values.area;
     const double G = still.values.cwiseAbs().maxCoeff(), slow = 2 * G / (drag + std::sqrt(drag * drag + 4 * G));

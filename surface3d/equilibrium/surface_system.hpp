@@ -90,7 +90,7 @@ public:
     // The wave number m around the axis of a surface of revolution of each displacement of the nodes, one column each,
     // if that has one; -1 where there is none.
     std::vector<int> wave_numbers(const Eigen::VectorXd& u, const Eigen::MatrixXd& displacements) const;
-    int held_motions() const { return static_cast<int>(motions_.cols()); }
+    int held_motions() const { return static_cast<int>(without_cost_.functionals[without_cost_.on_axis].cols()); }
 
 private:
     Bending bending(const Eigen::VectorXd& u) const;
@@ -104,11 +104,12 @@ private:
     ConstrainedForm second_variation(const Eigen::VectorXd& u) const {
         return second_variation(u, problem_.constraints);
     }
-    Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh) const;
+    Eigen::MatrixXd rigid_motions(const CurvedMesh& mesh, bool on_axis) const;
+    bool is_on_axis(const Eigen::VectorXd& u) const { return hold_axis(problem_, bead_force(u), size(u), scale_); }
     double stiffness(const Eigen::VectorXd& u) const;  // a size of its eigenvalues
     bool take_new_mesh(const CurvedMesh& shape, int triangles, Eigen::VectorXd& u, Eigen::VectorXd* along);
-    void set_mesh(const CurvedMesh& mesh);
-    void set_base(const CurvedMesh& mesh);
+    void set_mesh(const CurvedMesh& mesh, double force);
+    void set_base(const CurvedMesh& mesh, double force);
     void set_motions();
     void set_turn(const Eigen::MatrixXd& rigid, const Eigen::Vector3d& centre, double size, double least);
 
@@ -125,8 +126,13 @@ private:
         Eigen::Vector3d velocity, omega;
     };
     std::optional<Turn> turn_;
-    Eigen::MatrixXd motions_;  // functionals of w, one column each, that hold the motions; orthonormal
-    double scale_ = 0;         // reference energy of the base
+    // Of w, one column each, that hold the motions without cost; orthonormal. The second ones are for beads that hold
+    // the surface on their axis, as those of the base do or, as far as their force is known, do not.
+    struct {
+        std::array<Eigen::MatrixXd, 2> functionals;
+        bool on_axis = false;
+    } without_cost_;
+    double scale_ = 0;  // reference energy of the base
     // The last derivatives and sums, and where they were taken: these at a shape.
     mutable Eigen::VectorXd at_, sums_at_;
     mutable std::optional<EnergyDerivatives> last_;

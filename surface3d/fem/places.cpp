@@ -1,6 +1,7 @@
 #include "surface3d/fem/places.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -205,6 +206,25 @@ Eigen::MatrixXd unmoved_by(const Formula& W, const CurvedMesh& mesh, const Eigen
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(all, n);
     out(possible, Eigen::all) = gram.vectors.leftCols(n);
     return out;
+}
+
+Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const std::vector<Potential>& potentials, bool with_beads,
+                             const Eigen::Vector3d& centre, double size) {
+    constexpr int all = 6, across = 2;
+    Eigen::MatrixXd out = Eigen::MatrixXd::Identity(all, all);
+    if (mesh.period > 0) out = out(Eigen::all, std::array{0, 1, 2, 5}).eval();
+    if (const auto W = potential_density_in_space(potentials)) out = unmoved_by(*W, mesh, centre, size);
+    if (!with_beads) return out;
+    // Those that are combinations of what the potentials leave.
+    Eigen::MatrixXd of_axis = Eigen::MatrixXd::Zero(all, 2), left(all, 0);
+    of_axis(2, 0) = of_axis(5, 1) = 1;
+    of_axis.col(1).head(across) << -centre.y() / size, centre.x() / size;
+    for (const auto& motion : of_axis.colwise()) {
+        if (out.cols() == 0 || (out * least_squares(out, motion) - motion).norm() > 1e-6) continue;
+        left.conservativeResize(Eigen::NoChange, left.cols() + 1);
+        left.rightCols(1) = motion;
+    }
+    return left;
 }
 
 }  // namespace tubule::surface3d

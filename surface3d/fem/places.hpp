@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "common/energy/bead_equations.hpp"
 #include "common/energy/potential.hpp"
@@ -74,5 +75,9 @@ WallDistance wall_distance(const CurvedMesh& mesh, std::span<const Potential> po
 // Combinations of translations and of rotations about `centre`, of a tube about z alone, these per `size`, along which
 // a density of the place does not change at the nodes: one column of six each, translation before rotation.
 Eigen::MatrixXd unmoved_by(const Formula& W, const CurvedMesh& mesh, const Eigen::Vector3d& centre, double size);
+// Those that no potential and, if there are beads, these do not resist: beads let a surface move along the z axis and
+// turn about it.
+Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const std::vector<Potential>& potentials, bool with_beads,
+                             const Eigen::Vector3d& centre, double size);
 
 }  // namespace tubule::surface3d

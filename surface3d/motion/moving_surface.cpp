@@ -18,29 +18,6 @@ constexpr double kept = 1e-12;            // area and volume, relative
 constexpr double still_kept = 1e-8;       // a larger defect rejects the step
 constexpr double slight_friction = 1e-4;  // relative to viscosity/area; used if nothing else resists rigid motions
 
-// Combinations of translations and rotations about the origin, of a tube about the axis alone, that no potential and no
-// bead resists: beads let a surface move along the axis and turn about it.
-Eigen::MatrixXd free_motions(const CurvedMesh& mesh, const Bending& bending, bool with_beads) {
-    constexpr int all = 6, along = 2, around = 5;
-    Eigen::MatrixXd out = Eigen::MatrixXd::Identity(all, all);
-    if (mesh.period > 0) out = out(Eigen::all, std::array{0, 1, 2, around}).eval();
-    if (const auto W = potential_density_in_space(bending.potentials)) {
-        const double size = node_positions(mesh).cwiseAbs().maxCoeff();
-        out = unmoved_by(*W, mesh, Eigen::Vector3d::Zero(), size);
-        out.bottomRows(all / 2) /= size;
-    }
-    if (!with_beads) return out;
-    // Those that are combinations of what the potentials leave.
-    Eigen::MatrixXd along_axis = Eigen::MatrixXd::Zero(all, 0);
-    for (const int motion : {along, around}) {
-        const Eigen::VectorXd unit = Eigen::VectorXd::Unit(all, motion);
-        if (out.cols() == 0 || (out * least_squares(out, unit) - unit).norm() > 1e-6) continue;
-        along_axis.conservativeResize(Eigen::NoChange, along_axis.cols() + 1);
-        along_axis.rightCols(1) = unit;
-    }
-    return along_axis;
-}
-
 }  // namespace
 
 MovingSurface::MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, const Bending& bending,
@@ -54,7 +31,9 @@ MovingSurface::MovingSurface(const CurvedMesh& mesh, const SurfaceLaw& law, cons
     if (const int order = pressure_order(law, mesh.order); order > 0)
         pressure_mesh_ = order == mesh.order ? mesh : with_order(mesh, order);
     if (law.beads) beads_.emplace(law.beads->width, BeadEquations::in_space);
-    free_motions_ = free_motions(mesh, bending, beads_.has_value());
+    const double size = bending.potentials.empty() ? 1 : node_positions(mesh).cwiseAbs().maxCoeff();
+    free_motions_ = free_motions(mesh, bending.potentials, beads_.has_value(), Eigen::Vector3d::Zero(), size);
+    free_motions_.bottomRows<3>() /= size;
     if (law.viscosity == 0 || law.inertia != 0 || law.friction != 0) return;
     holds_rigid_motions_ = true;
     law_.friction = slight_friction * law.viscosity / extent(space_, mesh).area;

@@ -149,6 +149,27 @@ TEST(Beads, sphereGivesWayLinearly) {
     EXPECT_NEAR((distance(force) - distance(-force)) / (2 * force), compliance, 1e-6 * compliance);
 }
 
+// A sphere that moves across the axis by x gains x^2/2 SUM q d^2G/dx^2, as the weights stay. With INT W = 0 that is
+// f/w^4 INT W r^2/(dG/dP) for both beads, and the rate that over INT n_x^2 = 4 pi/3; to second order in the force.
+TEST(Beads, holdASphereOnTheirAxis) {
+    const double width = 0.3, force = 0.02;
+    const OnSphere exact(width);
+    const double stiffness = OnSphere::integral([&](double t) { return exact.W(t) * std::pow(std::sin(t), 2); }) /
+                             (std::pow(width, 4) * exact.by_P);
+    const auto rate = [&](double f) {
+        StationaryProblem problem{
+            bending(0.5), {.area = {}, .volume = 4 * pi / 3, .reduced_volume = {}}, {.tension = 3, .force = f}};
+        problem.beads = Beads{width, std::nullopt};
+        const Equilibrium e = find_equilibrium(problem, meridian(Sphere{1, {}}), {.accuracy = 1e-11});
+        EXPECT_EQ(e.stop, Stop::finished) << e.message;
+        const MotionLaw gradient_flow{.friction = 1, .inextensible = false, .keeps_volume = false};
+        return ModeStability(problem, e).rates(1, gradient_flow, 1).rates[0];
+    };
+    const double expected = -stiffness / (4 * pi / 3);
+    EXPECT_NEAR((rate(force) - rate(-force)) / (2 * force), expected, 1e-3 * std::abs(expected));
+    EXPECT_LT(rate(0), -1);  // nothing holds it, and no motion of the whole counts
+}
+
 const std::string pulled = "/tether.toml", branch = "/branch_tether.toml";
 
 Case of(const std::string& name, const std::vector<std::string>& sets) {

@@ -283,6 +283,29 @@ TEST(SurfaceSystem, beads) {
     }
 }
 
+// Beads bring a surface that is beside their axis back to it, whether their force or their distance is given.
+TEST(SurfaceEquilibrium, beadsHoldASurfaceOnTheirAxis) {
+    for (const std::optional<double> held : {std::optional<double>(), std::optional(0.0)}) {
+        StationaryProblem problem{{.k = {0.5}}, {{}, 4 * pi / 3, {}}};
+        problem.loads.tension = 3, problem.loads.force = held ? 0 : 4;
+        problem.beads = Beads{0.5, held ? std::optional(Ramp(*held)) : std::nullopt}, problem.bead_distance = 2.3;
+        const auto make = [](int triangles) {
+            CurvedMesh mesh = spheroid(triangles, 0.95, 1.1);
+            for (Eigen::Vector3d& x : mesh.nodes) x = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * x;
+            for (Eigen::Vector3d& x : mesh.nodes) x.x() += 0.1;
+            return mesh;
+        };
+        const SurfaceEquilibrium e = find_equilibrium(problem, make, {.triangles = 80, .modes = 2});
+        ASSERT_EQ(e.stop, Stop::finished) << e.message;
+        for (const char* moment : {"x", "y", "x*z", "y*z"})
+            EXPECT_NEAR(place_integral(SurfaceSpace(e.mesh), e.mesh, parse_formula(moment, Potential::in_space)), 0,
+                        5e-2)
+                << moment;
+        EXPECT_EQ(e.wave_numbers[0], 1);  // the same motion, which costs less than any bending
+        EXPECT_EQ(e.wave_numbers[1], 1);
+    }
+}
+
 // A mesh that does not resolve the beads is refused, not answered.
 TEST(SurfaceEquilibrium, beadsNeedFineMeshes) {
     StationaryProblem problem{{.k = {0.5}}, {{}, 4 * pi / 3, {}}};

@@ -75,9 +75,7 @@ class FlowRates(unittest.TestCase):
                         known.add(m)
                         exact = profile[f"growth_{m:.0f}"]
                         print(name, kind, f"m = {m:.0f}", rate, "+-", error, "exact", exact, flush=True)
-                        # Beads resist turns across the axis, which are left out as rigid motions: m = 1 differs by 0.7 %.
-                        least = 1e-2 if name == "beads" and m == 1 else 3e-3
-                        self.assertLess(abs(rate - exact), max(error, least * abs(exact)))
+                        self.assertLess(abs(rate - exact), max(error, 3e-3 * abs(exact)))
                     self.assertIn(max(range(5), key=lambda m: profile[f"growth_{m}"]), known)
 
     def test_a_fluid_as_it_runs(self):
