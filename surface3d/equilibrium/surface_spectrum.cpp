@@ -19,12 +19,14 @@
 namespace tubule::surface3d {
 namespace {
 
-// Factors of [A - shift M, C, L; C^T, 0, 0; L^T, 0, -1/weights], and how many eigenvalues lie below the shift.
+// Factors of [A - shift M, C, L S; C^T, 0, 0; S L^T, 0, -signs], S^2 = |weights|, and how many eigenvalues lie below
+// the shift. Weights may be tiny, as those of beads that hardly pull.
 class Shifted {
 public:
     Shifted(const ConstrainedForm& A, const Ordering& ordering, double shift,
             BorderedLdlt::Otherwise otherwise = BorderedLdlt::Otherwise::fail)
         : size_(A.form.rows()),
+          roots_(A.weights.cwiseAbs().cwiseSqrt()),
           factors_(ordering, static_cast<int>(A.constraints.cols() + A.low_rank.cols()), otherwise) {
         factors_.factor(bordered(A, shift));
         if (factors_.pivoted()) return;
@@ -42,12 +44,14 @@ public:
     Eigen::VectorXd solve_all(const Eigen::VectorXd& b) const {
         Eigen::VectorXd all = Eigen::VectorXd::Zero(factors_.size());
         all.head(size_) = b;
-        return factors_.solve(all);
+        all = factors_.solve(all);
+        all.tail(roots_.size()).array() *= roots_.array();
+        return all;
     }
     bool pivoted() const { return factors_.pivoted(); }
 
 private:
-    static Eigen::SparseMatrix<double> bordered(const ConstrainedForm& A, double shift) {
+    Eigen::SparseMatrix<double> bordered(const ConstrainedForm& A, double shift) const {
         const Eigen::SparseMatrix<double> form = A.form - shift * A.mass;
         const int n = static_cast<int>(form.rows()), c = static_cast<int>(A.constraints.cols()),
                   l = static_cast<int>(A.low_rank.cols());
@@ -59,18 +63,20 @@ private:
                 for (Eigen::SparseMatrix<double>::InnerIterator it(form, j); it; ++it)
                     out.insertBack(it.row(), j) = it.value();
                 for (int i = 0; i < c; ++i) out.insertBack(n + i, j) = A.constraints(j, i);
-                for (int i = 0; i < l; ++i) out.insertBack(n + c + i, j) = A.low_rank(j, i);
+                for (int i = 0; i < l; ++i) out.insertBack(n + c + i, j) = A.low_rank(j, i) * roots_[i];
                 continue;
             }
             for (int i = 0; i < n; ++i)
-                out.insertBack(i, j) = j < n + c ? A.constraints(i, j - n) : A.low_rank(i, j - n - c);
-            if (j >= n + c) out.insertBack(j, j) = -1 / A.weights[j - n - c];
+                out.insertBack(i, j) =
+                    j < n + c ? A.constraints(i, j - n) : A.low_rank(i, j - n - c) * roots_[j - n - c];
+            if (j >= n + c) out.insertBack(j, j) = A.weights[j - n - c] > 0 ? -1 : 1;
         }
         out.finalize();
         return out;
     }
 
     Eigen::Index size_;
+    Eigen::VectorXd roots_;
     BorderedLdlt factors_;
     int negative_ = 0;
 };
@@ -359,6 +365,18 @@ Eigen::MatrixXd span_of_modes(const InvertedFluid& inverse, int count, double sh
     }
 }
 
+// Empty, or why a value may be missing: the inertia between the last two that are apart counts them.
+std::string why_incomplete(const ConstrainedForm& A, const Ordering& ordering, const Eigen::VectorXd& values) {
+    const double spread = values.cwiseAbs().maxCoeff();
+    Eigen::Index last = values.size() - 1;
+    while (last > 0 && values[last] - values[last - 1] < 1e-6 * spread) --last;
+    if (last == 0) return {};
+    const double between = (values[last] + values[last - 1]) / 2;
+    const int below = count_below(A, ordering, between);
+    if (below == last) return {};
+    return fmt::format("{} eigenvalues are below {:.6g} by the inertia, {} by Lanczos' method", below, between, last);
+}
+
 }  // namespace
 
 void set_errors(const SurfaceSpectrum& coarse, int coarse_triangles, SurfaceSpectrum& fine, int fine_triangles,
@@ -430,24 +448,15 @@ SurfaceSpectrum lowest_eigenvalues(const ConstrainedForm& A, const Ordering& ord
         throw SolveError("Lanczos' method for the lowest eigenvalues does not converge");
     SurfaceSpectrum out;
     out.values = lanczos.eigenvalues(), out.vectors = lanczos.eigenvectors();
-    // The inertia between the last two values that are apart tells whether one is missing.
-    const double spread = out.values.cwiseAbs().maxCoeff();
-    int last = count - 1;
-    while (last > 0 && out.values[last] - out.values[last - 1] < 1e-6 * spread) --last;
     try {
         out.negative = count_negative(A, ordering, scale);
-        if (last > 0) {
-            const double between = (out.values[last] + out.values[last - 1]) / 2;
-            const int below = count_below(A, ordering, between);
-            if (below > last && basis < 60) {  // one of a multiple value: rounding finds it among more vectors
-                SurfaceSpectrum more = lowest_eigenvalues(A, ordering, count + 20, scale);
-                more.values.conservativeResize(count);
-                more.vectors.conservativeResize(Eigen::NoChange, count);
-                return more;
-            }
-            if (below != last)
-                out.doubt = fmt::format("{} eigenvalues are below {:.6g} by the inertia, {} by Lanczos' method", below,
-                                        between, last);
+        out.doubt = why_incomplete(A, ordering, out.values);
+        if (!out.doubt.empty() && basis < 60) {  // one of a multiple value: rounding finds it among more vectors
+            SurfaceSpectrum more = lowest_eigenvalues(A, ordering, count + 20, scale);
+            more.values.conservativeResize(count);
+            more.vectors.conservativeResize(Eigen::NoChange, count);
+            more.doubt = why_incomplete(A, ordering, more.values);
+            return more;
         }
     } catch (const SolveError& error) {
         out.doubt = fmt::format("the number of eigenvalues could not be counted: {}", error.what());

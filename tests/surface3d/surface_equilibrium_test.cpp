@@ -66,7 +66,7 @@ TEST(SurfaceEquilibrium, aVolumeThatNoShapeHasIsRefused) {
               "a reduced volume of 1.2 is impossible: the largest is 1, that of a sphere");
 }
 
-// Dense eigenvalues within the constraints, with parts of low rank of either sign.
+// Dense eigenvalues within the constraints, with parts of low rank of either sign, one next to nothing.
 TEST(SurfaceSpectrum, constraintsAndLowRank) {
     const int n = 80;
     ConstrainedForm A;
@@ -77,8 +77,8 @@ TEST(SurfaceSpectrum, constraintsAndLowRank) {
     }
     const auto column = [&](double q) { return Eigen::VectorXd::LinSpaced(n, 0, q).array().cos().matrix().eval(); };
     A.constraints.resize(n, 2), A.constraints << column(3), column(50);
-    A.low_rank.resize(n, 2), A.low_rank << column(7), column(20);
-    A.weights = Eigen::Vector2d(2, -0.5);
+    A.low_rank.resize(n, 3), A.low_rank << column(7), column(20), column(30);
+    A.weights = Eigen::Vector3d(2, -0.5, 1e-18);
     const Eigen::MatrixXd Z = orthogonal_complement(A.constraints, 1e-12);
     const Eigen::MatrixXd full = Eigen::MatrixXd(A.form) + A.low_rank * A.weights.asDiagonal() * A.low_rank.transpose();
     const Eigen::VectorXd dense = eigenpairs(Z.transpose() * full * Z, Z.transpose() * A.mass * Z)->values;
