@@ -22,14 +22,17 @@ public:
     using Shape = SurfaceEquilibrium;
     using Settings = SurfaceEquilibriumSettings;
 
-    SurfaceTier(const StationaryProblem& problem, const SurfaceEquilibrium& start, const Settings& settings)
+    // `leaves`: it begins at a bifurcation.
+    SurfaceTier(const StationaryProblem& problem, const SurfaceEquilibrium& start, const Settings& settings,
+                bool leaves)
         : settings_(settings), system_(start.mesh, problem, start.H0), start_(system_.unknowns_at_base()) {
         start_[system_.sigma()] = start.sigma, start_[system_.lambda()] = start.lambda;
         if (problem.beads) start_.segment<4>(system_.beads()) = start.beads.numbers;
         size_ = system_.size(start_);
-        // The penalty on kinks belongs to the base, which was another one.
+        // The penalty on kinks belongs to the base, which was another one. At a bifurcation the matrix may be singular.
         int iterations = 0;
-        if (!Newton(system_, start_, iterations).converge(0.1)) throw SolveError("the first shape cannot be corrected");
+        if (!Newton(system_, start_, iterations).converge(0.1) && !leaves)
+            throw SolveError("the first shape cannot be corrected");
         most_kinks_ = std::max(settings.accuracy, 2 * kinks(start_));
         triangles_ = start.mesh.triangles();
     }
@@ -145,7 +148,7 @@ Branch follow_branch(const StationaryProblem& problem, const SurfaceEquilibrium&
                      const BranchSettings& settings) {
     check_branch(start.stop, settings.from, settings.to);
     try {
-        SurfaceTier tier(problem, start, settings.shapes);
+        SurfaceTier tier(problem, start, settings.shapes, settings.mode > 0);
         return Follower(tier, problem, tier.start(), set, settings).run();
     } catch (const SolveError& error) {
         Branch broken;
