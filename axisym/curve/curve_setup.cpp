@@ -273,10 +273,11 @@ InitialState state_without_velocity(const CurveSetup& setup) {
 
 CurveSettings settings_for(const Problem& c, const InitialShape& start, CurveSettings s) {
     constexpr double most_lost = 0.1;  // of the energy; what less than that costs, a pair of runs shows
-    if (c.profile_resolution_given() || !start.meridian.seams.empty()) return s;
+    if (c.profile_resolution_given()) return s;
     const double allowed = most_lost * start.bending.magnitude;
     const ArcLength arc(start.meridian);
     s.elements = std::max(s.elements, elements_for(c.energy.potentials, arc.total()));
+    if (!start.meridian.seams.empty()) return s;
     while (can_be_finer(s)) {
         // Waves that only the gradient term holds need elements half as long as their scale.
         const auto space = space_of(c, start.meridian, first_breaks(arc, s, c, least_seam));

@@ -277,6 +277,16 @@ TEST(Potential, spheresAreDrawnThroughTheirFriction) {
     }
 }
 
+// A shape with seams begins with elements that resolve a wall, too.
+TEST(Potential, capsulesAtWallsAreResolved) {
+    const Outcome o = run_case(parse_case(
+        "tier = \"axisym\"\nenergy = {k20 = 0.5, potential = [{kind = \"plane\", z = -1.6, range = 0.04, strength = "
+        "1}]}\n"
+        "shape = {kind = \"capsule\", radius = 0.5, length = 2}\naccuracy = {energy = 1e-3}\ntime = {end = 1e-5}\n",
+        {}, "case.toml"));
+    EXPECT_EQ(o.summary.stop.reason, Stop::finished) << o.summary.stop.message;
+}
+
 TEST(Potential, wallsAreNotPassed) {
     // A sphere that a pressure inflates into a weak wall; one where a formula of the place ceases to be defined.
     const std::string inflated =

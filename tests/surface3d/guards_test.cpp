@@ -192,8 +192,9 @@ TEST(Guards, AdviseNothingThatACaseRefuses) {
     // Every key that is named, with a value that the documentation allows, in a case that moves. One that such a case
     // does not have is refused.
     const std::map<std::string, std::string> values{
-        {"accuracy.r_min", "1e-3"},         {"discretisation.order", "3"}, {"discretisation.mesh", "graded"},
-        {"discretisation.relaxation", "1"}, {"discretisation.step", "1"},  {"discretisation.recovery", "patch"}};
+        {"accuracy.energy", "1e-2"},         {"accuracy.r_min", "1e-3"},         {"discretisation.order", "3"},
+        {"discretisation.mesh", "graded"},   {"discretisation.relaxation", "1"}, {"discretisation.step", "1"},
+        {"discretisation.recovery", "patch"}};
     const std::string moving =
         "tier = \"surface3d\"\n[energy]\nk20 = 1\n[shape]\nkind = \"sphere\"\nradius = 1\n[time]\nend = 1\n";
     EXPECT_THROW(parse_case(moving, {"discretisation.recovery=patch"}, "case.toml"), std::exception);
