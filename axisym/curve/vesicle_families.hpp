@@ -19,8 +19,8 @@ Curve bowl(double thickness, double opening);
 // Reduced volumes within this of 1 are those of spheres, which belong to no family.
 inline constexpr double volume_off_sphere = 1e-3;
 
-// Of a profile that is its own mirror image: prolate if longer than wide, else oblate; of another one: stomatocyte if a
-// pole lies inside its height, else pear. Nothing for a sphere.
+// A profile that is its own mirror image is prolate if longer than wide, else oblate; another one is a stomatocyte if a
+// pole lies inside its height, else a pear. Nothing for a sphere.
 std::optional<Family> family_of(const Curve& cell, double reduced_volume);
 std::string_view name(Family family);
 

@@ -68,7 +68,7 @@ public:
 
     double width() const { return width_; }
     bool has_bead(int bead) const { return bead >= first(); }
-    // Of the equations, that of a distance that is held.
+    // The row of a distance that is held.
     int distance_row() const { return foot_ ? 3 : 1; }
     // Densities of G and dG/dP.
     const Formula& density(int bead) const { return beads_[bead].G; }

@@ -126,8 +126,8 @@ private:
         Eigen::Vector3d velocity, omega;
     };
     std::optional<Turn> turn_;
-    // Of w, one column each, that hold the motions without cost; orthonormal. The second ones are for beads that hold
-    // the surface on their axis, as those of the base do or, as far as their force is known, do not.
+    // Functionals of w, one column each, that hold the motions without cost; orthonormal. The second ones are for beads
+    // that hold the surface on their axis, as those of the base do or, as far as their force is known, do not.
     struct {
         std::array<Eigen::MatrixXd, 2> functionals;
         bool on_axis = false;

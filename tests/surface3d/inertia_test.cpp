@@ -113,7 +113,7 @@ TEST(InertiaStudy, OfSecondVariations) {
     all.report("among all, which nothing asks for", 0.1);
 }
 
-// Of [A - shift D, -shift B^T; -shift B, 0], with what is held, for the shifts below all rates, and others.
+// The matrix [A - shift D, -shift B^T; -shift B, 0], with what is held, for the shifts below all rates, and others.
 TEST(InertiaStudy, OfFlows) {
     Random random(2);
     Tally below, among;
