@@ -40,9 +40,8 @@ struct SurfaceLaw : MotionLaw {
         return source.mass_at(at);
     }
     bool holds_distance() const { return beads && beads->extension; }
-    bool holds_rate() const {
-        return holds_distance() && inertia != 0;
-    }  // too: the velocity cannot follow a jump of it
+    // The rate, too: with inertia the velocity jumps where it does.
+    bool holds_rate() const { return holds_distance() && inertia != 0; }
 };
 
 }  // namespace tubule::surface3d

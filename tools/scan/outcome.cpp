@@ -60,6 +60,9 @@ Outcome outcome_of(Stop reason, const EndShape& end) {
 }
 
 Outcome cell_at_rest(std::optional<Family> family) {
+    static_assert(
+        static_cast<int>(Outcome::pear) - static_cast<int>(Outcome::prolate) == static_cast<int>(Family::pear),
+        "outcomes of cells stand in the order of families");
     if (!family) return Outcome::sphere;
     return static_cast<Outcome>(static_cast<int>(Outcome::prolate) + static_cast<int>(*family));
 }
